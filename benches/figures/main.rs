@@ -11,6 +11,7 @@ mod feed;
 mod fitting;
 mod fixture;
 mod http;
+mod library;
 mod measure;
 mod program;
 mod ring;

@@ -12,6 +12,7 @@ use crate::feed;
 use crate::fitting;
 use crate::fixture;
 use crate::http::{self, Bare, Clock, Exchange};
+use crate::library;
 use crate::measure::{Measured, Unit, cpu_time};
 use crate::program;
 use crate::ring;
@@ -79,6 +80,8 @@ pub(crate) fn all() -> Vec<Row> {
             roundness::four(3600)
         }),
         row("complete roundness evaluation, 3600 points", Unit::Time, None, None, || roundness::answer(3600)),
+        row("three names resolved into a fresh job", Unit::Time, us(50.0), us(15.0), library::resolve),
+        row("designation of an insert read", Unit::Time, us(2.0), us(0.5), library::code),
         row("NIST StRD, 54 runs, default setting, no derivatives given", Unit::Time, None, None, fitting::nist_time),
         row("of these not solved to 4 digits", Unit::Count, Some(0.0), Some(0.0), || fitting::nist_missed(4.0)),
         row("of these not solved to 6 digits", Unit::Count, Some(2.0), Some(0.0), || fitting::nist_missed(6.0)),

@@ -75,7 +75,7 @@ pub(super) fn takes_any(calculator: &str) -> bool {
 /// Fields that stand beside names, by the component that has them.
 fn beside(component: &str) -> Vec<(&'static str, Value)> {
     match component {
-        "ForceModelKienzle" => vec![
+        "ForceModelKienzle" | "RingForceLaw" => vec![
             (
                 "normal_force",
                 json!({ "type": "string", "enum": ["judged"], "example": "judged", "x-group": "cut",
@@ -108,6 +108,12 @@ fn filled(component: &str) -> &'static [&'static str] {
         "ForceModelHandbook" => &["cutting_edge_angle_deg"],
         "FaceMill" => &["diameter_mm", "teeth"],
         "MillingForce" => &["coefficient"],
+        "RingForceLaw" => &[
+            "specific_cutting_force_n_per_mm2",
+            "cutting_exponent",
+            "specific_normal_force_n_per_mm2",
+            "normal_exponent",
+        ],
         _ => &[],
     }
 }

@@ -67,6 +67,16 @@ fn milling_by_names() -> Value {
     })
 }
 
+fn ring_by_name() -> Value {
+    json!({
+        "material": "4140", "force": { "edge_width_mm": 12, "normal_force": "judged" },
+        "ring": { "radius_mm": 150, "ellipticity_mm": 0.5 }, "supports": { "distance_mm": 200, "depth_mm": 111 },
+        "tool": { "x_mm": 100, "y_mm": 113.5, "feed_mm_per_rev": 0.08, "revolutions": 32, "spark_out_revolutions": 1 },
+        "stiffness": { "tool_n_per_mm": 60_000, "support_a_n_per_mm": 150_000, "support_b_n_per_mm": 150_000 },
+        "forces": { "weight_n": 300 },
+    })
+}
+
 #[tokio::test]
 async fn a_job_with_names_has_the_answer_of_the_job_with_their_numbers() {
     let (server, elsewhere) = (server().await, server().await);
@@ -74,6 +84,7 @@ async fn a_job_with_names_has_the_answer_of_the_job_with_their_numbers() {
         (DEFLECTION, shaft_by_names(), ["machine", "tool", "material"]),
         ("/v1/feed-schedule", schedule_by_names(), ["machine", "tool", "material"]),
         ("/v1/fixture-stability", milling_by_names(), ["machine", "tool", "material"]),
+        ("/v1/ring-roundness", ring_by_name(), ["material"; 3]),
     ] {
         let named = answer(&server, path, &job).await;
         for kind in kinds {
@@ -84,7 +95,7 @@ async fn a_job_with_names_has_the_answer_of_the_job_with_their_numbers() {
         }
         // Every number in the origins is that at its pointer; what a record filled in has an origin.
         let (origins, input) = (named["origins"].as_array().unwrap(), &named["input"]);
-        assert!(origins.len() > 5, "{path}: {origins:#?}");
+        assert!(origins.len() >= 4, "{path}: {origins:#?}");
         for origin in origins {
             let pointer = origin["pointer"].as_str().unwrap();
             let there = input.pointer(pointer).unwrap_or(&Value::Null);
@@ -156,6 +167,42 @@ async fn a_changed_record_changes_new_answers_and_no_old_one() {
     assert_eq!((&kept["input"], &kept["resources"]), (&before["input"], &before["resources"]));
     assert_eq!(put(&server, "/v1/machines/lathe-3", &stiff).await.1["revision"], 3, "a number is never given again");
     server.stop().await;
+}
+
+#[tokio::test]
+async fn a_record_tells_which_results_got_it() {
+    let server = server().await;
+    let record = json!({ "from": "lathe_engine_medium" });
+    let changed = json!({ "from": "lathe_engine_medium", "set": { "/tags": ["a"] } });
+    for record in [record, changed] {
+        put(&server, "/v1/machines/lathe-3", &record).await;
+    }
+    let mut job = shaft_by_names();
+    assert_eq!(got(&server, "/v1/machines/lathe-3@2").await["uses"], 0);
+    job["machine"] = json!("lathe-3@2");
+    let key = answer(&server, DEFLECTION, &job).await["key"].clone();
+    let stored = got(&server, "/v1/machines/lathe-3@2").await;
+    assert_eq!(stored["uses"], 1);
+    let there = got(&server, stored["links"]["uses"].as_str().unwrap()).await;
+    assert_eq!(there["items"].as_array().unwrap().iter().map(|item| &item["key"]).collect::<Vec<_>>(), [&key]);
+    // Of no other revision, and of the built-in ones that it names beside.
+    assert_eq!(got(&server, "/v1/machines/lathe-3@1").await["uses"], 0);
+    assert_eq!(got(&server, "/v1/machines/lathe_engine_medium").await["uses"], 0);
+    assert_eq!(got(&server, "/v1/tools/bar_a25_pclnr12").await["uses"], 1);
+    let material = got(&server, "/v1/materials/42crmo4").await;
+    assert_eq!(
+        (&material["uses"], &got(&server, "/v1/results?record=materials/42crmo4").await["items"]),
+        (&json!(1), &there["items"])
+    );
+    let mut bare = answer(&server, DEFLECTION, &job).await["input"].clone();
+    bare["cut"]["speed_m_per_min"] = json!(181);
+    assert!(answer(&server, DEFLECTION, &bare).await["resources"].is_null());
+    assert_eq!(got(&server, "/v1/machines/lathe-3@2").await["uses"], 1);
+    for bad in ["lathe-3", "shafts/lathe-3", "machines/lathe-3@0", "machines/Lathe", "machines/lathe-3@04", "parts/a"] {
+        let response = server.get(&format!("/v1/results?record={bad}")).send().await.unwrap();
+        let problem = problem(response, 400, "bad_query").await;
+        assert!(problem["detail"].as_str().unwrap().contains("machines/lathe-3@4"), "{problem}");
+    }
 }
 
 #[tokio::test]

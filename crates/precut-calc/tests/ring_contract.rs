@@ -309,6 +309,90 @@ fn stiffness_gives_the_compliance_ratio() {
     assert!((found - 20_000.0 * (1.0 / 60_000.0 + 1.0 / 150_000.0)).abs() < 1e-9);
 }
 
+/// Kienzle's law for the job of [`short`], b = 12 mm.
+fn force_law() -> Value {
+    json!({ "edge_width_mm": 12, "specific_cutting_force_n_per_mm2": 2100, "cutting_exponent": 0.26,
+        "specific_normal_force_n_per_mm2": 900, "normal_exponent": 0.35 })
+}
+
+#[test]
+fn the_force_law_gives_what_the_job_leaves_open() {
+    let mut job = short();
+    job["force"] = force_law();
+    job["analyses"] = json!(["simulation", "linear_theory"]);
+    job["stiffness"] = json!({ "tool_n_per_mm": 60_000, "support_a_n_per_mm": 150_000, "support_b_n_per_mm": 90_000 });
+    job["forces"] = json!({ "weight_n": 300 });
+    let answer = run(&job);
+    assert!(answer.basis.iter().any(|basis| basis.equation == "ring/4.3"));
+    let by_law = answer.output;
+    let cut = by_law.setting.cut_force.unwrap();
+    // The closed form at h = S dR/ds.
+    let h = by_law.setting.radius_per_feed * 0.08;
+    let thrust = 900.0 * 12.0 * h.powf(0.65);
+    for (found, expected) in [
+        (cut.chip_thickness_um, 1000.0 * h),
+        (cut.thrust_n, thrust),
+        (cut.cutting_n, 2100.0 * 12.0 * h.powf(0.74)),
+        (cut.cut_n_per_mm, 0.65 * thrust / h),
+    ] {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+    }
+    // The same job with these numbers in it.
+    let mut stated = job.clone();
+    stated.as_object_mut().unwrap().remove("force");
+    stated["stiffness"]["cut_n_per_mm"] = json!(cut.cut_n_per_mm);
+    stated["forces"] = json!({ "weight_n": 300, "thrust_n": cut.thrust_n, "cutting_n": cut.cutting_n });
+    let mut plain = run(&stated).output;
+    assert_eq!(plain.setting.cut_force, None);
+    plain.setting.cut_force = by_law.setting.cut_force;
+    assert_eq!(json!(plain), json!(by_law));
+    // What is stated beside the law stays.
+    job["stiffness"]["cut_n_per_mm"] = json!(20_000);
+    let ratio = run(&job).output.setting.compliance_ratio;
+    assert!((ratio - 20_000.0 * (1.0 / 60_000.0 + 1.0 / 150_000.0)).abs() < 1e-9);
+}
+
+#[test]
+fn the_chip_of_the_force_law_is_what_a_revolution_takes_off() {
+    let mut job = short();
+    job["ring"] = json!({ "radius_mm": 150 });
+    job["force"] = force_law();
+    job["tool"]["spark_out_revolutions"] = json!(0);
+    let mean = |revolutions: u32| {
+        let mut job = job.clone();
+        job["tool"]["revolutions"] = json!(revolutions);
+        run(&job).output
+    };
+    let (before, after) = (mean(31), mean(32));
+    let taken_um = 1000.0 * (before.mean_radius_mm.unwrap() - after.mean_radius_mm.unwrap());
+    let chip_um = after.setting.cut_force.unwrap().chip_thickness_um;
+    // dR/ds changes over a revolution by about S/R.
+    assert!((taken_um / chip_um - 1.0).abs() < 2e-3, "{taken_um} {chip_um}");
+}
+
+#[test]
+fn what_no_force_law_gives_is_asked_for() {
+    let mut job = short();
+    job["stiffness"] = json!({ "tool_n_per_mm": 60_000, "support_a_n_per_mm": 150_000, "support_b_n_per_mm": 90_000 });
+    job["dynamics"] = json!({ "work_speed_rpm": 60, "modes": [{ "frequency_hz": 180, "stiffness_n_per_mm": 80_000, "damping_ratio": 0.04 }] });
+    job["forces"] = json!({ "weight_n": 300 });
+    assert_eq!(codes(&job), ["cut_force_missing"; 4]);
+    job["force"] = force_law();
+    assert!(faults(&job).is_empty());
+    // The message's own remedy works.
+    job["analyses"] = json!(["settings_search"]);
+    job["settings_search"] = json!({ "target_um": 20 });
+    assert_eq!(codes(&job), ["search_needs_cut_stiffness"; 2]);
+    let cut = {
+        let mut job = job.clone();
+        job["analyses"] = json!(["linear_theory"]);
+        run(&job).output.setting.cut_force.unwrap().cut_n_per_mm
+    };
+    job["stiffness"]["cut_n_per_mm"] = json!(cut);
+    job["dynamics"]["cut_n_per_mm"] = json!(cut);
+    assert!(faults(&job).is_empty());
+}
+
 #[test]
 fn search_says_what_is_out_of_reach_and_what_would_help() {
     let mut job = paper();

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::calculator::{Check, Finding, Violations};
 
+use super::cut_force;
 use super::input::{Analysis, Job, MAX_STEPS, Method, ProfileRow};
 use super::sampling::samples_of;
 use super::scene::Scene;
@@ -36,6 +37,8 @@ pub(super) const CODES: &[&str] = &[
     "feed_too_deep",
     "run_too_long",
     "compliance_given_twice",
+    "cut_force_missing",
+    "search_needs_cut_stiffness",
     "wheel_with_compliance",
     "not_with_nearest_samples",
     "search_range_missing",
@@ -66,6 +69,7 @@ impl Check for Job {
         check_profile(self, violations);
         check_numerics(self, violations);
         check_machine(self, violations);
+        cut_force::check(self, violations);
         check_analyses(self, violations);
         check_effects(self, violations);
         // Of a radius of nothing, or a feed backwards, the rest would only be consequences.

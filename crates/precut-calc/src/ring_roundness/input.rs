@@ -6,6 +6,7 @@ use utoipa::{PartialSchema, ToSchema};
 use crate::calculator::{Measured, MeasuredRow};
 use crate::effects::{RingConditions, RingEffect};
 
+use super::cut_force::ForceLaw;
 use super::input_ranges::{MapRange, SearchRange, SpeedRange};
 
 /// Most steps of a run, revolutions times samples.
@@ -50,6 +51,11 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
     pub dynamics: Option<Dynamics>,
+    /// Force law of the ring: it gives the stiffness of the cut and the forces that `stiffness`, `dynamics` and `forces` leave
+    /// open, at the job's own feed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
+    pub force: Option<ForceLaw>,
     /// Forces on the ring, to learn whether it stays on its supports.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("cut"))))]
@@ -245,9 +251,10 @@ pub enum Rotation {
 #[serde(deny_unknown_fields)]
 #[schema(as = RingStiffness)]
 pub struct Stiffness {
-    /// Thrust force per mm of depth, specific force times width.
+    /// Thrust force per mm of depth, specific force times width; left out where `force` gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e9, example = 20_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k_c w"))))]
-    pub cut_n_per_mm: f64,
+    pub cut_n_per_mm: Option<f64>,
     /// Tool with its holder and slide.
     #[schema(minimum = 1.0, maximum = 1e12, example = 50_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k_T"))))]
     pub tool_n_per_mm: f64,
@@ -264,9 +271,10 @@ pub struct Stiffness {
 #[serde(deny_unknown_fields)]
 #[schema(as = RingDynamics)]
 pub struct Dynamics {
-    /// Thrust force per mm of depth, specific force times width.
+    /// Thrust force per mm of depth, specific force times width; left out where `force` gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e9, example = 20_000.0, extensions(("x-unit" = json!("N/mm")), ("x-symbol" = json!("k_c w"))))]
-    pub cut_n_per_mm: f64,
+    pub cut_n_per_mm: Option<f64>,
     /// Revolutions of the ring per minute.
     #[schema(minimum = 0.01, maximum = 100_000.0, example = 60.0, extensions(("x-unit" = json!("rev/min")), ("x-symbol" = json!("n_w"))))]
     pub work_speed_rpm: f64,
@@ -314,12 +322,14 @@ pub enum ModePlace {
 #[serde(deny_unknown_fields)]
 #[schema(as = RingForces)]
 pub struct Forces {
-    /// Thrust toward the centre.
+    /// Thrust toward the centre; left out where `force` gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e8, example = 400.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_p"))))]
-    pub thrust_n: f64,
-    /// Main cutting force, against the surface.
+    pub thrust_n: Option<f64>,
+    /// Main cutting force, against the surface; left out where `force` gives it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e8, example = 800.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("F_c"))))]
-    pub cutting_n: f64,
+    pub cutting_n: Option<f64>,
     /// Weight of the ring.
     #[schema(minimum = 0.0, maximum = 1e9, example = 100.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("W"))))]
     pub weight_n: f64,

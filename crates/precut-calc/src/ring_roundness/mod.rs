@@ -11,6 +11,7 @@
 mod advice;
 mod causes;
 mod check;
+mod cut_force;
 pub mod cylindricity;
 mod elsewhere;
 pub mod evaluation;
@@ -40,6 +41,7 @@ mod surface;
 mod tables;
 mod turning;
 
+pub use cut_force::{CutForce, ForceLaw};
 pub use forward::{RingAllowances, RingPoint, RingRun};
 pub use input::{
     Analysis, Drive, Dynamics, ErrorEstimate, Forces, Job, LongWave, Method, Mode, ModePlace, ProfileRow, Ring,
@@ -78,7 +80,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -227,6 +229,7 @@ fn work(job: &Job) -> Work {
 }
 
 fn cost(job: &Job) -> Cost {
+    let job = &*cut_force::resolved(job);
     let work = work(job);
     let samples = sampling::samples_of(job);
     let mut ms = 1.0 + work.simulation + work.theory;
@@ -249,6 +252,8 @@ fn cost(job: &Job) -> Cost {
 
 fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     checkpoint(monitor)?;
+    let cut_force = cut_force::of(job);
+    let job = &*cut_force::resolved(job);
     let scene = Scene::of(job, &job.effects);
     let end = scene.end().ok_or_else(|| Failure::OutOfModel(Finding::new("no_end_position", "/tool")))?;
     let mut outcome = Outcome {
@@ -258,7 +263,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         roundness_unfiltered_error_um: None,
         mean_radius_mm: None,
         mean_radius_error_um: None,
-        setting: setting(job, &scene, &end)?,
+        setting: SettingOutcome { cut_force, ..setting(job, &scene, &end)? },
         simulation: None,
         linear_theory: None,
         speed_map: None,
@@ -299,7 +304,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let warnings = advice::warnings(job, &scene, &end, &outcome);
     let explanation = advice::explanation(job, &scene, &end, &outcome);
     monitor.progress(1.0, Message::new("stage_done"));
-    Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+    Ok(Answer { basis: basis(job, &outcome), output: outcome, warnings, explanation })
 }
 
 fn setting(job: &Job, scene: &Scene, end: &Stance) -> Result<SettingOutcome, Failure> {
@@ -324,12 +329,14 @@ fn setting(job: &Job, scene: &Scene, end: &Stance) -> Result<SettingOutcome, Fai
         radius_per_feed: per_feed,
         half_turn_reduction_um: per_feed * scene.setting.feed_mm_per_rev * UM_PER_MM,
         gap_at_start_um: simulate::gap_at_start_mm(job, scene)? * UM_PER_MM,
+        cut_force: None,
         reactions: job.forces.as_ref().map(|forces| reactions(forces, scene, end)),
     })
 }
 
 fn reactions(forces: &Forces, scene: &Scene, end: &Stance) -> ReactionsOutcome {
-    let load = Load { thrust_n: forces.thrust_n, cutting_n: forces.cutting_n, weight_n: forces.weight_n };
+    let (thrust_n, cutting_n) = (forces.thrust_n.unwrap_or(0.0), forces.cutting_n.unwrap_or(0.0));
+    let load = Load { thrust_n, cutting_n, weight_n: forces.weight_n };
     // The mirror turns a clockwise ring into a counter-clockwise one and swaps the supports.
     let swap = |(a, b): (f64, f64)| if scene.mirrored { (b, a) } else { (a, b) };
     let (support_a_n, support_b_n) = swap(reactions_n(end, &load, 1.0, false));
@@ -342,14 +349,14 @@ fn reactions(forces: &Forces, scene: &Scene, end: &Stance) -> ReactionsOutcome {
         support_b_n,
         driven_support_a_n: driven.map(|(a, _)| a),
         driven_support_b_n: driven.map(|(_, b)| b),
-        friction_needed: (driven.is_some() && seated && pressed > 0.0).then(|| forces.cutting_n / pressed),
-        drive_torque_n_m: forces.cutting_n * end.radius_mm / 1000.0,
+        friction_needed: (driven.is_some() && seated && pressed > 0.0).then(|| cutting_n / pressed),
+        drive_torque_n_m: cutting_n * end.radius_mm / 1000.0,
         seated,
     }
 }
 
 /// The equations that acted.
-fn basis(job: &Job) -> Vec<Basis> {
+fn basis(job: &Job, outcome: &Outcome) -> Vec<Basis> {
     const COPYING: &str = "regenerative centring: Dall 1946, Gurney 1964, Rowe and Barash 1964";
     let mut used = vec![
         Basis { equation: "ring/2.2", source: "circle through the tip that touches both supports" },
@@ -375,6 +382,7 @@ fn basis(job: &Job) -> Vec<Basis> {
     add(simulation && job.supports.roller_radius_mm > 0.0, &[("ring/3.2", "envelope of the roller")]);
     add(simulation && job.tool.wheel_radius_mm.is_some(), &[("ring/3.5", "sides of the wheel")]);
     add(simulation && job.method == Method::NearestSamples, &[("ring/9.1", "Shchurova 2012")]);
+    add(outcome.setting.cut_force.is_some(), &[("ring/4.3", "Kienzle, VDI-Z. 94 (1952) 299-305, over the whole edge")]);
     add(job.forces.is_some(), &[("ring/4.1", "equilibrium of the ring")]);
     add(job.stiffness.is_some(), &[("ring/4.2", "stiffness of tool and supports")]);
     add(

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::cut_force::CutForce;
 use super::output_settings::{LinearOutcome, MapOutcome, SearchOutcome, SpeedMapOutcome};
 
 /// How round the ring will be, and what decides it.
@@ -82,6 +83,8 @@ pub struct SettingOutcome {
     /// Distance of the tip from the surface before the ring turns, negative inside.
     #[schema(extensions(("x-unit" = json!("um"))))]
     pub gap_at_start_um: f64,
+    /// What the force law comes to; null where none is given.
+    pub cut_force: Option<CutForce>,
     /// What the supports bear; null where no forces are given.
     pub reactions: Option<ReactionsOutcome>,
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use crate::effects::RingEffect as Effect;
 use crate::num::roundness::{PeriodicSpline, RoundnessError};
 
+use super::cut_force;
 use super::input::{Job, Ring, Rotation};
 use super::lobing::Lobing;
 use super::softness::Softness;
@@ -69,7 +70,7 @@ impl Scene {
                 Effect::WorkSlip { slip_deg_per_rev } => setting.motion.slip += slip_deg_per_rev / 360.0,
             }
         }
-        let softness = Softness::of(job, push_off);
+        let softness = Softness::of(&cut_force::resolved(job), push_off);
         let mirrored = job.rotation == Rotation::Clockwise;
         let (mut setting, softness) =
             if mirrored { (mirror(&setting), softness.mirrored()) } else { (setting, softness) };

@@ -43,7 +43,7 @@ impl Softness {
                 (ModePlace::SupportA, stiffness.support_a_n_per_mm),
                 (ModePlace::SupportB, stiffness.support_b_n_per_mm),
             ]
-            .map(|(place, n_per_mm)| (place, stiffness.cut_n_per_mm / n_per_mm))
+            .map(|(place, n_per_mm)| (place, stiffness.cut_n_per_mm.unwrap_or(0.0) / n_per_mm))
             .to_vec()
         });
         let dynamics = job.dynamics.as_ref();
@@ -51,7 +51,7 @@ impl Softness {
             stated: job.compliance_ratio + push_off,
             springs,
             modes: dynamics.map_or_else(Vec::new, |dynamics| dynamics.modes.clone()),
-            cut_n_per_mm: dynamics.map_or(0.0, |dynamics| dynamics.cut_n_per_mm),
+            cut_n_per_mm: dynamics.and_then(|dynamics| dynamics.cut_n_per_mm).unwrap_or(0.0),
             work_speed_rpm: dynamics.map_or(1.0, |dynamics| dynamics.work_speed_rpm),
         }
     }

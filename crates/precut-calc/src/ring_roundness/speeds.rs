@@ -35,7 +35,8 @@ pub(super) fn speeds_rpm(job: &Job, dynamics: &Dynamics) -> (f64, f64) {
 /// The highest order at which modes can make a wave grow: where a mode of the ratio K at rest, beyond its natural
 /// frequency, has come down to |K(iω)| = 1/2, (ω/ν)² = 1 + 2 K.
 fn chatter_to(dynamics: &Dynamics, speed_rpm: f64) -> u32 {
-    let softest: f64 = dynamics.modes.iter().map(|mode| dynamics.cut_n_per_mm / mode.stiffness_n_per_mm).sum();
+    let cut_n_per_mm = dynamics.cut_n_per_mm.unwrap_or(0.0);
+    let softest: f64 = dynamics.modes.iter().map(|mode| cut_n_per_mm / mode.stiffness_n_per_mm).sum();
     let fastest_hz = dynamics.modes.iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
     let lobes = BEYOND * fastest_hz * 60.0 / speed_rpm * (1.0 + 2.0 * softest).sqrt();
     whole(lobes.ceil() + 2.0).clamp(LEAST_ORDER, MOST_ORDER)

@@ -22,9 +22,9 @@ pub struct Asked {
 /// Every record that a job of `calculator` names; none for a calculator that takes no names, and for a job as it was
 /// before there were names.
 pub fn asked(calculator: &str, job: &Value) -> Vec<Asked> {
-    let Some(_) = Room::of(calculator) else { return Vec::new() };
+    let Some(room) = Room::of(calculator) else { return Vec::new() };
     let mut found = Vec::new();
-    for kind in Kind::NAMED {
+    for kind in Kind::NAMED.into_iter().filter(|kind| room.takes(*kind)) {
         let Some(value) = job.get(kind.name()) else { continue };
         match value {
             Value::String(name) => push(kind, format!("/{}", kind.name()), name, &mut found),

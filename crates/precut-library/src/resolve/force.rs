@@ -3,13 +3,14 @@
 use precut_calc::calculator::{Finding, Message};
 use serde_json::Value;
 
+use super::kinds::Room;
 use super::origin::{From, Part};
 use super::view::{View, Views};
 use super::writer::Writer;
 use crate::kienzle::{self, Choice, JUDGED_FORCE_PERCENT, Row, Sources};
 
 /// Elastic constants of the shaft, then the force.
-pub(super) fn fill(views: &Views<'_>, writer: &mut Writer<'_>) {
+pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
     if let Some(material) = views.material_of_shaft() {
         shaft(material, writer);
     }
@@ -25,7 +26,7 @@ pub(super) fn fill(views: &Views<'_>, writer: &mut Writer<'_>) {
         geometry(tool, writer);
     }
     match writer.word("/force/kind") {
-        Some("kienzle") => of_kienzle(views, writer),
+        Some("kienzle") => of_kienzle(room, views, writer),
         Some("handbook") => {
             if let Some(material) = material {
                 handbook(material, writer);
@@ -33,6 +34,11 @@ pub(super) fn fill(views: &Views<'_>, writer: &mut Writer<'_>) {
         }
         _ => {}
     }
+}
+
+/// The law of a wide edge.
+pub(super) fn ring(views: &Views<'_>, writer: &mut Writer<'_>) {
+    of_kienzle(Room::Ring, views, writer);
 }
 
 fn shaft(material: &View<'_>, writer: &mut Writer<'_>) {
@@ -125,7 +131,7 @@ fn choice(writer: &mut Writer<'_>) -> (Option<usize>, Option<String>) {
     (row.and_then(|row| usize::try_from(row).ok()), source)
 }
 
-fn of_kienzle(views: &Views<'_>, writer: &mut Writer<'_>) {
+fn of_kienzle(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
     let (row, source) = choice(writer);
     let normal_force = writer.take("/force", "normal_force");
     let Some(material) = views.material_of_force() else { return };
@@ -150,9 +156,12 @@ fn of_kienzle(views: &Views<'_>, writer: &mut Writer<'_>) {
         );
         return;
     };
-    cutting(views, &sources, writer);
+    cutting(room, views, &sources, writer);
     let judged = normal(material, &sources.used, normal_force.as_ref(), writer);
-    uncertainty(material, &sources, judged, writer);
+    if room == Room::Deflection {
+        uncertainty(&sources, judged, writer);
+    }
+    conflict(material, &sources, writer);
 }
 
 fn part_of(row: &Row<'_>) -> Part {
@@ -160,7 +169,7 @@ fn part_of(row: &Row<'_>) -> Part {
 }
 
 /// k_c1.1, at the tool's rake where tool and row say theirs, and m_c.
-fn cutting(views: &Views<'_>, sources: &Sources<'_>, writer: &mut Writer<'_>) {
+fn cutting(room: Room, views: &Views<'_>, sources: &Sources<'_>, writer: &mut Writer<'_>) {
     let row = &sources.used;
     let rake = views.tool.as_ref().and_then(|tool| tool.number("/rake_angle_deg")).map(|(value, _)| value);
     let factor = rake.and_then(|rake| row.rake_factor(rake));
@@ -177,7 +186,7 @@ fn cutting(views: &Views<'_>, sources: &Sources<'_>, writer: &mut Writer<'_>) {
     writer.offer("/force/specific_cutting_force_n_per_mm2", force, vec![part.clone().worth(force)]);
     let exponent = row.cutting_exponent;
     writer.offer("/force/cutting_exponent", exponent, vec![part_of(row).worth(exponent)]);
-    if !own {
+    if !own && room != Room::Ring {
         writer.offer("/force/certainty", row.certainty.to_owned(), vec![part_of(row).worth(row.certainty.to_owned())]);
     }
 }
@@ -214,17 +223,19 @@ fn normal(material: &View<'_>, row: &Row<'_>, word: Option<&Value>, writer: &mut
     true
 }
 
-/// How well the force is known, and what the other sources say.
-fn uncertainty(material: &View<'_>, sources: &Sources<'_>, judged: bool, writer: &mut Writer<'_>) {
+/// How well the force is known.
+fn uncertainty(sources: &Sources<'_>, judged: bool, writer: &mut Writer<'_>) {
     let mut percent = sources.force_percent;
     let mut part = part_of(&sources.used).by("library/3");
     if judged && percent < JUDGED_FORCE_PERCENT {
         percent = JUDGED_FORCE_PERCENT;
         part = Part::sourced(From::Material, "judgement", "judgement").by("library/6");
     }
-    if writer.job().get("zones").is_none() {
-        writer.offer("/uncertainty/force_percent", percent, vec![part.worth(percent)]);
-    }
+    writer.offer("/uncertainty/force_percent", percent, vec![part.worth(percent)]);
+}
+
+/// What the other sources say, where they differ.
+fn conflict(material: &View<'_>, sources: &Sources<'_>, writer: &mut Writer<'_>) {
     if !sources.is_conflict() {
         return;
     }

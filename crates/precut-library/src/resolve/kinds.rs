@@ -15,6 +15,8 @@ pub(super) enum Room {
     Schedule,
     /// A cutter and a spindle.
     Milling,
+    /// A ring: its material alone.
+    Ring,
 }
 
 impl Room {
@@ -23,9 +25,15 @@ impl Room {
         match calculator {
             "deflection-compensation" => Some(Self::Deflection),
             "feed-schedule" => Some(Self::Schedule),
+            "ring-roundness" => Some(Self::Ring),
             "fixture-stability" | "milling-stability" => Some(Self::Milling),
             _ => None,
         }
+    }
+
+    /// Whether its jobs name records of that kind.
+    pub(super) fn takes(self, kind: Kind) -> bool {
+        self != Self::Ring || kind == Kind::Material
     }
 
     fn kinds(self, kind: Kind) -> &'static [&'static str] {
@@ -53,7 +61,7 @@ pub(super) fn check(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
             );
         }
     }
-    if room == Room::Milling {
+    if matches!(room, Room::Milling | Room::Ring) {
         return;
     }
     let Some(tool) = &views.tool else { return };

@@ -183,13 +183,14 @@ pub fn resolve(calculator: &str, job: &mut Value, found: &[(Asked, Lookup)]) -> 
         kinds::Room::Deflection => {
             turning::fill(calculator, &views, &mut writer);
             turning::check_cut(&views, &mut writer);
-            force::fill(&views, &mut writer);
+            force::fill(room, &views, &mut writer);
         }
         kinds::Room::Schedule => {
             turning::fill(calculator, &views, &mut writer);
             schedule::fill(&views, &mut writer);
-            force::fill(&views, &mut writer);
+            force::fill(room, &views, &mut writer);
         }
+        kinds::Room::Ring => force::ring(&views, &mut writer),
         kinds::Room::Milling => milling::fill(calculator, &views, &mut writer),
     }
     writer.into_resolution()
