@@ -87,10 +87,8 @@ async fn read(
 async fn document(app: &App, caller: &Caller, record: &StoredRecord, language: Language) -> Result<Document, Problem> {
     let (kind, name) = (record.record.kind, &record.record.name);
     let revisions = app.engine.record_revisions(&caller.shelf(), kind, name).await?;
-    let uses = match Kind::NAMED.contains(&kind) {
-        true => Some(app.engine.uses(record.address(), caller.shown()).await?),
-        false => None,
-    };
+    let uses =
+        if Kind::NAMED.contains(&kind) { Some(app.engine.uses(record.address(), caller.shown()).await?) } else { None };
     Ok(Document::json(&said(record, &Around { revisions, uses }, language), Some(language)))
 }
 

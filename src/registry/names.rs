@@ -14,8 +14,12 @@ pub(crate) fn takes(calculator: &str, kind: Kind) -> bool {
 }
 
 /// What belongs to names elsewhere in a job; `*` are the items of a list.
-const BESIDE: [&[&str]; 7] = [
+const BESIDE: [&[&str]; 11] = [
     &["supports", "*", "rest"],
+    &["tools", "*", "name"],
+    &["tools", "*", "insert"],
+    &["tools", "*", "holder"],
+    &["stock", "material"],
     &["shaft", "material"],
     &["force", "material"],
     &["force", "normal_force"],
@@ -92,6 +96,23 @@ fn beside(component: &str) -> Vec<(&'static str, Value)> {
                     "description": "Takes the row of this source in place of the preferred one." }),
             ),
         ],
+        "ProgramTool" => vec![
+            (
+                "name",
+                json!({ "type": "string", "maxLength": 100, "example": "cnmg120408_pclnr2525m12", "x-group": "cut",
+                    "description": "A tool by name: its record gives the edge." }),
+            ),
+            (
+                "insert",
+                json!({ "type": "string", "maxLength": 64, "example": "DNMG150608", "x-group": "cut", "x-advanced": true,
+                    "description": "Designation of the insert, ISO 1832: it gives the nose." }),
+            ),
+            (
+                "holder",
+                json!({ "type": "string", "maxLength": 64, "example": "PDJNL2525M15", "x-group": "cut", "x-advanced": true,
+                    "description": "Designation of the holder, ISO 5608, or of the bar, ISO 6261: it gives the angles." }),
+            ),
+        ],
         "SupportSteadyRest" | "SupportFollowRest" => vec![(
             "rest",
             json!({ "type": "string", "maxLength": 64, "example": "steady", "x-group": "machine", "x-advanced": true,
@@ -108,6 +129,7 @@ fn filled(component: &str) -> &'static [&'static str] {
         "ForceModelHandbook" => &["cutting_edge_angle_deg"],
         "FaceMill" => &["diameter_mm", "teeth"],
         "MillingForce" => &["coefficient"],
+        "ProgramTool" => &["nose_radius_mm", "cutting_edge_angle_deg", "minor_edge_angle_deg"],
         "RingForceLaw" => &[
             "specific_cutting_force_n_per_mm2",
             "cutting_exponent",

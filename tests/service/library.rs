@@ -77,6 +77,29 @@ fn ring_by_name() -> Value {
     })
 }
 
+/// An example of programs, with a lathe, a steel, and tools by codes and by name.
+fn program_by_names() -> Value {
+    let all = Registry::standard().unwrap();
+    let example = all.entry("program-compensation").unwrap().meta().examples[1].job;
+    let mut job: Value = serde_json::from_str(example).unwrap();
+    let tools = job["tools"].clone();
+    job["machine"] = json!("lathe_engine_medium");
+    job["material"] = json!("4140");
+    job["tools"] = json!([
+        { "number": tools[0]["number"], "tip_direction": 3, "insert": "CNMG120408", "holder": "PCLNL2525M12" },
+        { "number": tools[1]["number"], "tip_direction": 3, "name": "dnmg150608_pdjnr2525m15", "nose_radius_mm": 0.4 },
+    ]);
+    job["force"] = json!({ "kind": "kienzle", "normal_force": "judged" });
+    job["stock"].as_object_mut().unwrap().remove("material");
+    for support in job["supports"].as_array_mut().unwrap() {
+        for number in ["compliance_um_per_n", "rotational_compliance_rad_per_n_mm"] {
+            support.as_object_mut().unwrap().remove(number);
+        }
+    }
+    job.as_object_mut().unwrap().remove("carriage");
+    job
+}
+
 #[tokio::test]
 async fn a_job_with_names_has_the_answer_of_the_job_with_their_numbers() {
     let (server, elsewhere) = (server().await, server().await);
@@ -85,12 +108,14 @@ async fn a_job_with_names_has_the_answer_of_the_job_with_their_numbers() {
         ("/v1/feed-schedule", schedule_by_names(), ["machine", "tool", "material"]),
         ("/v1/fixture-stability", milling_by_names(), ["machine", "tool", "material"]),
         ("/v1/ring-roundness", ring_by_name(), ["material"; 3]),
+        ("/v1/program-compensation", program_by_names(), ["machine", "material", "tools_1"]),
     ] {
         let named = answer(&server, path, &job).await;
         for kind in kinds {
             let resource = &named["resources"][kind];
             assert_eq!(resource["built_in"], true, "{path} {kind}");
-            let record = got(&server, &format!("/v1/{kind}s/{}", resource["name"].as_str().unwrap())).await;
+            let folder = kind.split('_').next().unwrap().trim_end_matches('s');
+            let record = got(&server, &format!("/v1/{folder}s/{}", resource["name"].as_str().unwrap())).await;
             assert_eq!((&resource["sha256"], &resource["data_version"]), (&record["sha256"], &record["data_version"]));
         }
         // Every number in the origins is that at its pointer; what a record filled in has an origin.

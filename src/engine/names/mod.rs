@@ -274,7 +274,10 @@ pub(crate) fn records_of(input: &[u8]) -> String {
         .and_then(|place| serde_json::from_slice::<Map<String, Value>>(&drawn[place]).ok())
         .unwrap_or_default();
     let named = resources.iter().filter_map(|(place, resource)| {
-        let kind = Kind::NAMED.into_iter().find(|kind| place.rsplit('_').next() == Some(kind.name()))?;
+        // `tool`, `shaft_material`, or `tools_0`.
+        let mut words = place.split('_');
+        let kind =
+            words.find_map(|word| Kind::NAMED.into_iter().find(|kind| [kind.name(), kind.plural()].contains(&word)))?;
         let name = resource.get("name")?.as_str()?;
         let revision = resource.get("revision").or_else(|| resource.get("data_version"))?.as_u64()?;
         Some(format!("{}/{name}@{revision}|", kind.plural()))

@@ -36,13 +36,24 @@ pub fn asked(calculator: &str, job: &Value) -> Vec<Asked> {
             _ => {}
         }
     }
-    for part in ["shaft", "force"] {
+    for (index, tool) in turret(room, job).iter().enumerate() {
+        if let Some(Value::String(name)) = tool.get("name") {
+            push(Kind::Tool, format!("/tools/{index}/name"), name, &mut found);
+        }
+    }
+    for part in [room.work(), "force"] {
         let Some(Value::String(name)) = job.get(part).and_then(|part| part.get("material")) else { continue };
         if !found.is_empty() || needs_record(part, job, name) {
             push(Kind::Material, format!("/{part}/material"), name, &mut found);
         }
     }
     found
+}
+
+/// The tools of a job that has several.
+pub(super) fn turret(room: Room, job: &Value) -> &[Value] {
+    let tools = job.get("tools").filter(|_| room == Room::Program);
+    tools.and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 /// Whether the material of a part is for the library: not where the calculator knows it itself.

@@ -11,10 +11,11 @@ use crate::kienzle::{self, Choice, JUDGED_FORCE_PERCENT, Row, Sources};
 
 /// Elastic constants of the shaft, then the force.
 pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
-    if let Some(material) = views.material_of_shaft() {
-        shaft(material, writer);
+    let has_work = room != Room::Program || writer.at("/stock").is_some();
+    if let Some(material) = views.material_of_shaft().filter(|_| has_work) {
+        elastic(room, material, writer);
     }
-    let wants_force = writer.at("/force").is_some() || writer.job().get("zones").is_none();
+    let wants_force = writer.at("/force").is_some() || room == Room::Deflection;
     if !wants_force {
         return;
     }
@@ -22,7 +23,7 @@ pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
     if writer.at("/force/kind").is_none() && material.is_some_and(|material| !rows_of(material).is_empty()) {
         writer.put("/force/kind", "kienzle".into());
     }
-    if let Some(tool) = &views.tool {
+    if let Some(tool) = views.tools().next() {
         geometry(tool, writer);
     }
     match writer.word("/force/kind") {
@@ -36,15 +37,29 @@ pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
     }
 }
 
+/// The edges of the tools of a turret.
+pub(super) fn turret(views: &Views<'_>, writer: &mut Writer<'_>) {
+    for (index, tool) in &views.turret {
+        for field in ["nose_radius_mm", "cutting_edge_angle_deg", "minor_edge_angle_deg"] {
+            let pointer = format!("/tools/{index}/{field}");
+            if let Some((value, part)) = of_tool(tool, field, &pointer, writer) {
+                writer.offer(&pointer, value, vec![part]);
+            }
+        }
+    }
+}
+
 /// The law of a wide edge.
 pub(super) fn ring(views: &Views<'_>, writer: &mut Writer<'_>) {
     of_kienzle(Room::Ring, views, writer);
 }
 
-fn shaft(material: &View<'_>, writer: &mut Writer<'_>) {
-    for field in ["youngs_modulus_n_per_mm2", "poisson_ratio", "density_kg_per_m3", "yield_strength_n_per_mm2"] {
+fn elastic(room: Room, material: &View<'_>, writer: &mut Writer<'_>) {
+    let fields = ["youngs_modulus_n_per_mm2", "poisson_ratio", "density_kg_per_m3", "yield_strength_n_per_mm2"];
+    let fields = if room == Room::Program { &fields[..3] } else { &fields };
+    for field in fields {
         if let Some((value, part)) = material.number(&format!("/{field}")) {
-            writer.offer(&format!("/shaft/{field}"), value, vec![part]);
+            writer.offer(&format!("/{}/{field}", room.work()), value, vec![part]);
         }
     }
 }

@@ -17,6 +17,8 @@ pub(super) enum Room {
     Milling,
     /// A ring: its material alone.
     Ring,
+    /// A program with its blank and the tools of its turret.
+    Program,
 }
 
 impl Room {
@@ -25,6 +27,7 @@ impl Room {
         match calculator {
             "deflection-compensation" => Some(Self::Deflection),
             "feed-schedule" => Some(Self::Schedule),
+            "program-compensation" => Some(Self::Program),
             "ring-roundness" => Some(Self::Ring),
             "fixture-stability" | "milling-stability" => Some(Self::Milling),
             _ => None,
@@ -33,7 +36,17 @@ impl Room {
 
     /// Whether its jobs name records of that kind.
     pub(super) fn takes(self, kind: Kind) -> bool {
-        self != Self::Ring || kind == Kind::Material
+        match self {
+            Self::Ring => kind == Kind::Material,
+            // Its tools stand in a list.
+            Self::Program => kind != Kind::Tool,
+            _ => true,
+        }
+    }
+
+    /// The field of what is turned.
+    pub(super) fn work(self) -> &'static str {
+        if self == Self::Program { "stock" } else { "shaft" }
     }
 
     fn kinds(self, kind: Kind) -> &'static [&'static str] {
@@ -49,8 +62,8 @@ impl Room {
 
 /// Machine and tool must be of a kind that the calculator knows, and a holder one that turns along the shaft.
 pub(super) fn check(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
-    for (view, code) in [(&views.machine, "wrong_kind_of_machine"), (&views.tool, "wrong_kind_of_tool")] {
-        let Some(view) = view else { continue };
+    let machine = views.machine.iter().map(|view| (view, "wrong_kind_of_machine"));
+    for (view, code) in machine.chain(views.tools().map(|view| (view, "wrong_kind_of_tool"))) {
         let Some(kind) = view.text("kind") else { continue };
         let allowed = room.kinds(view.kind);
         if !allowed.contains(&kind) {

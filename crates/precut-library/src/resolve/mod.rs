@@ -181,13 +181,18 @@ pub fn resolve(calculator: &str, job: &mut Value, found: &[(Asked, Lookup)]) -> 
     kinds::check(room, &views, &mut writer);
     match room {
         kinds::Room::Deflection => {
-            turning::fill(calculator, &views, &mut writer);
+            turning::fill(room, calculator, &views, &mut writer);
             turning::check_cut(&views, &mut writer);
             force::fill(room, &views, &mut writer);
         }
         kinds::Room::Schedule => {
-            turning::fill(calculator, &views, &mut writer);
+            turning::fill(room, calculator, &views, &mut writer);
             schedule::fill(&views, &mut writer);
+            force::fill(room, &views, &mut writer);
+        }
+        kinds::Room::Program => {
+            turning::fill(room, calculator, &views, &mut writer);
+            force::turret(&views, &mut writer);
             force::fill(room, &views, &mut writer);
         }
         kinds::Room::Ring => force::ring(&views, &mut writer),

@@ -5,13 +5,14 @@ use std::f64::consts::PI;
 use precut_calc::calculator::{Finding, Message};
 use serde_json::Value;
 
+use super::kinds::Room;
 use super::origin::{From, Part};
 use super::view::{View, Views};
 use super::writer::Writer;
 use crate::kienzle::of_certainty_percent;
 
 /// Supports, carriage, control, travel and stored model.
-pub(super) fn fill(calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>) {
+pub(super) fn fill(room: Room, calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>) {
     let mut known = Known::default();
     if let Some(machine) = &views.machine {
         supports(machine, writer, &mut known);
@@ -19,8 +20,11 @@ pub(super) fn fill(calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>)
     drop_rests(writer);
     carriage(views, writer, &mut known);
     if let Some(machine) = &views.machine {
-        control(machine, writer);
-        travel(machine, writer);
+        if room != Room::Program {
+            // How a program is to be read is said with it, and never guessed.
+            control(machine, writer);
+        }
+        travel(room, machine, writer);
         model(calculator, machine, writer);
     }
     if calculator == "deflection-compensation" {
@@ -261,18 +265,24 @@ fn control(machine: &View<'_>, writer: &mut Writer<'_>) {
 }
 
 /// A part must find room in the machine.
-fn travel(machine: &View<'_>, writer: &mut Writer<'_>) {
+fn travel(room: Room, machine: &View<'_>, writer: &mut Writer<'_>) {
     let number = |segment: &Value, field: &str| segment.get(field).and_then(Value::as_f64);
     let segments = writer.items("/shaft/segments");
     let length = segments.iter().filter_map(|segment| number(segment, "length_mm")).sum::<f64>();
     let widest = |segment: &Value| number(segment, "stock_diameter_mm").or_else(|| number(segment, "diameter_mm"));
     let diameter = segments.iter().filter_map(widest).fold(0.0, f64::max);
+    let outline = writer.items("/stock/profile");
+    let largest = |field: &str| outline.iter().filter_map(|row| number(row, field)).fold(0.0, f64::max);
+    let (length, diameter, at) = match room {
+        Room::Program => (largest("z_mm"), largest("diameter_mm"), "/stock/profile"),
+        _ => (length, diameter, "/shaft/segments"),
+    };
     for (value, path, quantity) in
         [(length, "/travel/between_centres_mm", "length"), (diameter, "/travel/diameter_max_mm", "diameter")]
     {
         let Some((limit, _)) = machine.number(path) else { continue };
         if value > limit {
-            above(machine, "/shaft/segments", (value, limit, "mm"), path, quantity, writer);
+            above(machine, at, (value, limit, "mm"), path, quantity, writer);
         }
     }
 }

@@ -3,6 +3,7 @@
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
+use super::asked::turret;
 use super::kinds::Room;
 use super::origin::{From, Part};
 use super::writer::Writer;
@@ -93,9 +94,11 @@ impl<'a> View<'a> {
 pub(super) struct Views<'a> {
     pub(super) machine: Option<View<'a>>,
     pub(super) tool: Option<View<'a>>,
+    /// Those of a turret that have a record or codes, with their places in it.
+    pub(super) turret: Vec<(usize, View<'a>)>,
     /// The material of the whole job.
     material: Option<View<'a>>,
-    /// The material of `/shaft` alone.
+    /// The material of what is turned alone.
     of_shaft: Option<View<'a>>,
     /// The material of `/force` alone.
     of_force: Option<View<'a>>,
@@ -106,19 +109,22 @@ impl<'a> Views<'a> {
     pub(super) fn take(room: Room, writer: &mut Writer<'_>, found: &'a [(Asked, Lookup)]) -> Option<Self> {
         let mut views = Self::default();
         let tool_by_codes = is_by_codes(writer.job().get("tool"));
-        if found.is_empty() && !tool_by_codes {
+        let of_turret = turret(room, writer.job()).iter().any(|tool| is_by_codes(Some(tool)));
+        if found.is_empty() && !tool_by_codes && !of_turret {
             return None;
         }
         for (asked, lookup) in found {
             let resource = looked_up(asked, lookup, writer);
             let record = resource.map(|resource| resource.record.as_ref());
             match asked.pointer.as_str() {
-                "/shaft/material" | "/force/material" => {
+                // In their places further down.
+                _ if room == Room::Program && asked.kind == Kind::Tool => {}
+                "/shaft/material" | "/stock/material" | "/force/material" => {
                     let (part, _) = asked.pointer.rsplit_once('/').unwrap_or_default();
                     writer.take(part, "material");
                     let view =
                         record.map(|record| View::new(asked.kind, asked.pointer.clone(), Some(record), Value::Null));
-                    *(if part == "/shaft" { &mut views.of_shaft } else { &mut views.of_force }) = view;
+                    *(if part == "/force" { &mut views.of_force } else { &mut views.of_shaft }) = view;
                 }
                 _ => {
                     let over = taken(room, asked.kind, writer);
@@ -134,15 +140,35 @@ impl<'a> Views<'a> {
             let over = taken(room, Kind::Tool, writer);
             views.tool = Some(View::new(Kind::Tool, "/tool".to_owned(), None, over));
         }
-        if let Some(tool) = &views.tool {
+        for index in 0..turret(room, writer.job()).len() {
+            let pointer = format!("/tools/{index}");
+            let place = format!("{pointer}/name");
+            writer.take(&pointer, "name");
+            let codes = ["insert", "holder"].map(|code| (code, writer.take(&pointer, code)));
+            let over: Map<String, Value> =
+                codes.into_iter().filter_map(|(code, value)| Some((code.to_owned(), value?))).collect();
+            let of_name = found.iter().find(|(asked, _)| asked.pointer == place);
+            let resource = of_name.and_then(|(asked, lookup)| looked_up(asked, lookup, writer));
+            if resource.is_some() || !over.is_empty() {
+                let record = resource.map(|resource| resource.record.as_ref());
+                views.turret.push((index, View::new(Kind::Tool, pointer, record, Value::Object(over))));
+            }
+        }
+        for tool in views.tools() {
             for fault in &tool.codes.faults {
                 // A code of the record has no place of its own in the job.
                 let own = tool.over.pointer(&fault.pointer).is_some();
                 let fault = fault.clone();
-                writer.fault(if own { fault.under("/tool") } else { Finding { pointer: "/tool".to_owned(), ..fault } });
+                let pointer = tool.pointer.clone();
+                writer.fault(if own { fault.under(&pointer) } else { Finding { pointer, ..fault } });
             }
         }
         Some(views)
+    }
+
+    /// All tools of the job.
+    pub(super) fn tools(&self) -> impl Iterator<Item = &View<'a>> {
+        self.tool.iter().chain(self.turret.iter().map(|(_, view)| view))
     }
 
     /// Where a record that a job names has its place.
