@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::input::{DiagnosisOptions, PriorWeight};
 use super::known::{Known, with_numbers};
 use super::subject::{Belief, Form, Setting, Subject};
+use super::weigh::Effort;
 use crate::calculator::{
     Design, Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable,
     JacobianColumn, Missing, Monitor, Over, Prediction, Smooth, Treatment, Unnamed, Variable,
@@ -14,6 +15,8 @@ use crate::calculator::{
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
 const DEAR_MS: f64 = 5.0;
+/// Up to this time a simulation is short: then all single causes are looked for in all their places.
+const SHORT_MS: f64 = 20.0;
 
 /// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
 ///
@@ -32,6 +35,7 @@ pub struct Bound<'a, M: Diagnosable> {
     hypotheses: Hypotheses,
     logarithmic: bool,
     dear: bool,
+    short: bool,
     /// The base with the numerics of divided differences.
     coarse_base: OnceLock<Vec<Prediction>>,
     monitor: &'a dyn Monitor,
@@ -58,9 +62,10 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
             hypotheses.inapplicable.extend(left.into_iter().map(|h| Inapplicable { cause: h.cause, reason }));
         }
         weigh(&mut hypotheses.applicable, &options.prior_weights);
-        let dear = M::predict_cost(&prepared).ms > DEAR_MS;
+        let ms = M::predict_cost(&prepared).ms;
+        let (dear, short) = (ms > DEAR_MS, ms <= SHORT_MS);
         let coarse_base = OnceLock::new();
-        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, monitor })
+        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, short, coarse_base, monitor })
     }
 
     /// The forward model's own view of the rows.
@@ -71,6 +76,11 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
     /// Whether a prediction costs more than the statistics about it.
     pub fn is_dear(&self) -> bool {
         self.dear
+    }
+
+    /// The whole search over its rows.
+    pub(super) fn effort(&self, most_causes: usize) -> Effort {
+        Effort::of(most_causes, self.dear, self.short)
     }
 
     /// What these rows can and cannot speak about.

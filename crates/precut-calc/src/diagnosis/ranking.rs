@@ -143,6 +143,31 @@ impl Ranking {
         Ok(())
     }
 
+    /// Looks for other optima of the refined sets of a choice, which is told the evidence of the set that leads: a mass that swings
+    /// at another frequency, a tooth that stands out to the other side. Alone they would be looked for there, too; the best one is
+    /// the fit of its set from then on.
+    pub(super) fn look_elsewhere_of(
+        &mut self,
+        choice: impl Fn(&Candidate, f64) -> bool,
+        linear: &Linear<'_>,
+        refinement: &Refinement<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let leads = self.candidates.iter().map(|candidate| candidate.log_z).fold(f64::NEG_INFINITY, f64::max);
+        for candidate in self.candidates.iter_mut().filter(|candidate| choice(candidate, leads)) {
+            checkpoint(monitor)?;
+            let own = self.fits.iter_mut().find(|(of, _)| *of == candidate.members);
+            let Some(fit) = own.and_then(|(_, fit)| fit.as_mut()) else { continue };
+            let best = elsewhere(candidate, fit, linear, refinement)?.into_iter().next();
+            if let Some(best) = best.filter(|best| best.log_z > fit.log_z) {
+                candidate.log_z += best.log_z - fit.log_z;
+                *fit = best;
+            }
+        }
+        by_weight(&mut self.candidates);
+        Ok(())
+    }
+
     /// Log weight of every set, alone and, where it leads, beside a remainder.
     pub(super) fn weigh(
         &self,

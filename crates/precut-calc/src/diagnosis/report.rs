@@ -56,7 +56,7 @@ pub(super) fn answer<M: Diagnosable>(
     }
     let keep = if job.options.leave_outliers_out { foundation.keep(&found) } else { foundation.predicted.clone() };
     stage(monitor, 0.2, "diagnosis_stage_search");
-    let [effort, fold_effort] = efforts(&job.options, used.len(), bound.is_dear());
+    let [effort, fold_effort] = efforts(&job.options, used.len(), bound);
     let mut weighing = Weighing::of(&foundation, keep, effort, monitor)?;
     let quantity = quantity::<M>(job)?;
     let mut refusal = refusal::<M>(job, &foundation, &weighing);
@@ -158,14 +158,10 @@ fn quantity<M: Diagnosable>(job: &JobOf<M>) -> Result<&'static Quantity, Failure
 }
 
 /// How far is searched over all rows, and in every fold.
-fn efforts(options: &DiagnosisOptions, rows: usize, is_dear: bool) -> [Effort; 2] {
+fn efforts<M: Diagnosable>(options: &DiagnosisOptions, rows: usize, bound: &Bound<'_, M>) -> [Effort; 2] {
     let most_causes = most_causes(usize::from(options.most_causes), rows);
-    let efforts = if is_dear {
-        [Effort::dear(most_causes), Effort::dear_fold(most_causes)]
-    } else {
-        [Effort::full(most_causes), Effort::fold(most_causes)]
-    };
-    efforts.map(|effort| Effort { level: options.level, ..effort })
+    let in_fold = if bound.is_dear() { Effort::dear_fold(most_causes) } else { Effort::fold(most_causes) };
+    [bound.effort(most_causes), in_fold].map(|effort| Effort { level: options.level, ..effort })
 }
 
 /// Labels of the causes that a next measurement parts.

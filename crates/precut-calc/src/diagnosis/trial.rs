@@ -17,7 +17,7 @@ pub fn best_evidence<M: Diagnosable>(job: &JobOf<M>) -> Result<f64, Failure> {
     with_measured::<M, _>(job, &Unwatched, |_, bound, data| {
         let foundation = Foundation::of(bound, data, &Unwatched)?;
         let most_causes = usize::from(job.options.most_causes);
-        let effort = if bound.is_dear() { Effort::dear(most_causes) } else { Effort::full(most_causes) };
+        let effort = bound.effort(most_causes);
         let weighing = Weighing::of(&foundation, foundation.predicted.clone(), effort, &Unwatched)?;
         Ok(weighing.best_evidence())
     })

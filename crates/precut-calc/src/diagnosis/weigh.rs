@@ -13,7 +13,7 @@ use super::optima::{Optimum, Peak};
 use super::profile::{Profile, Profiler};
 use super::ranking::Ranking;
 use super::refine::{Fit, Refinement};
-use super::search::Linear;
+use super::search::{Candidate, Linear};
 use super::subject::Setting;
 use super::whiten::{White, Whitener};
 use crate::calculator::{Failure, Hypothesis, Monitor, Smooth};
@@ -23,6 +23,8 @@ use crate::calculator::{Failure, Hypothesis, Monitor, Smooth};
 const LEADING_SINGLES: usize = 6;
 const LEADING_PAIRS: usize = 6;
 const PAIRS_OF_WHOLE: usize = 20;
+/// A set whose evidence is below that of the leader by no more than this may lead from another of its optima.
+const NEAR: f64 = 2.0;
 /// Sets that are refined about the model itself.
 const LEADERS: usize = 12;
 /// Sets that lead only after the others were refined, and are then refined too.
@@ -70,6 +72,8 @@ pub struct Effort {
     pub nonlinear: bool,
     /// Whether other optima of the leading set are looked for.
     pub other_optima: bool,
+    /// Whether those of every single cause are, and of every set that may yet lead.
+    pub elsewhere: bool,
     /// Least probability of what a set leaves for it to be named, and of what the base leaves for it to be adequate.
     pub level: f64,
     /// Whether a part of the rows is held back: then of classes, whose test of the base draws thousands, it is not tested.
@@ -91,6 +95,7 @@ impl Effort {
             late_leaders: LATE_LEADERS,
             nonlinear: false,
             other_optima: true,
+            elsewhere: false,
             level: LEVEL,
             in_fold: false,
         }
@@ -117,8 +122,24 @@ impl Effort {
             late_leaders: 2,
             nonlinear: true,
             other_optima: true,
+            elsewhere: false,
             level: LEVEL,
             in_fold: false,
+        }
+    }
+
+    /// Where a simulation is short: every single cause is looked for wherever it would be if it were asked for alone. From one
+    /// place a second mode was not found that alone has the most evidence.
+    pub fn short(most_causes: usize) -> Self {
+        Self { of_each_size: [0, usize::MAX, 3, 1], elsewhere: true, ..Self::dear(most_causes) }
+    }
+
+    /// Where every prediction is a simulation, and that a long one or not; else the whole search.
+    pub(super) fn of(most_causes: usize, is_dear: bool, is_short: bool) -> Self {
+        match (is_dear, is_short) {
+            (false, _) => Self::full(most_causes),
+            (true, true) => Self::short(most_causes),
+            (true, false) => Self::dear(most_causes),
         }
     }
 
@@ -133,6 +154,7 @@ impl Effort {
             late_leaders: 1,
             nonlinear: true,
             other_optima: false,
+            elsewhere: false,
             level: LEVEL,
             in_fold: true,
         }
@@ -224,6 +246,9 @@ impl<'a> Weighing<'a> {
         };
         let mut ranking = Ranking::new(candidates);
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
+        if effort.elsewhere {
+            ranking.look_elsewhere_of(|set, _| set.members.len() == 1, &linear, &refinement, monitor)?;
+        }
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
         }
@@ -231,6 +256,10 @@ impl<'a> Weighing<'a> {
             ranking.refine_beside_sizeless(&linear, &refinement, monitor)?;
         }
         ranking.refine_parts(&linear, &refinement, monitor)?;
+        if effort.elsewhere {
+            let is_near = |set: &Candidate, leads: f64| set.members.len() > 1 && set.log_z > leads - NEAR;
+            ranking.look_elsewhere_of(is_near, &linear, &refinement, monitor)?;
+        }
         if effort.other_optima {
             ranking.look_elsewhere(&linear, &refinement)?;
         }
