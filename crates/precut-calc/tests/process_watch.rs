@@ -3,10 +3,10 @@
 
 use crate::process_support::{Document, Part, process, stream};
 use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
-use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint, DeflectionRun};
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint};
 use precut_calc::effects::DeflectionEffect;
 use precut_calc::num::stats::Resampler;
-use precut_calc::process::{ActionKind, Situation, State, Watch, faults};
+use precut_calc::process::{ActionKind, Situation, State, Unused, Watch, faults};
 use serde_json::json;
 use std::ops::RangeInclusive;
 
@@ -27,7 +27,8 @@ struct Shop {
 
 impl Shop {
     fn new(seed: u64) -> Self {
-        let (document, parts) = process(&stream("r10-nothing-300.json"));
+        let (mut document, parts) = process(&stream("r10-nothing-300.json"));
+        document.options.false_alarm_every_parts = 500;
         Self { document, random: Resampler::new(seed, 3), template: parts[0].clone() }
     }
 
@@ -169,7 +170,7 @@ fn false_alarms_are_as_rare_as_promised() {
     let expected = f64::from(watched) / 500.0;
     if wanted.is_some() {
         let every = f64::from(watched) / (alarms as f64).max(1.0);
-        println!("one false alarm in {every:.0} parts");
+        eprintln!("one false alarm in {every:.0} parts");
         assert!((350.0..=750.0).contains(&every), "one false alarm in {every:.0} parts");
     } else {
         // More than four beyond what is expected come of chance once in a thousand times.
@@ -184,8 +185,42 @@ fn memory_is_bounded_however_many_parts_come() {
     let sizes = [200, 360].map(|count| replay(&shop.document, &parts[..count]).0.size());
     assert_eq!(sizes[0][..2], [160, 70]);
     assert_eq!(sizes[1][..2], [160, 70]);
-    // Eight cosines of one type, wear, and warmth of two time constants; at most six changes of at most eight columns each.
-    assert!(sizes.iter().all(|size| (11..=11 + 48).contains(&size[2])), "{sizes:?}");
+    // Eight cosines of one type, wear, and warmth of two time constants; at most six changes of at most eleven columns each.
+    assert!(sizes.iter().all(|size| (11..=11 + 66).contains(&size[2])), "{sizes:?}");
+}
+
+#[test]
+fn changes_of_long_ago_become_part_of_the_mean_profile() {
+    let mut shop = Shop::new(21);
+    let offset =
+        |number: u32| DeflectionEffect::SizeOffset { offset_um: f64::from(number.saturating_sub(15) / 15 % 2) * 10.0 };
+    let parts = shop.parts(170, |number| vec![offset(number)]);
+    let (watch, states) = replay(&shop.document, &parts);
+    let changes = &states.last().unwrap().changes;
+    // One at every fifteenth part from the thirtieth on.
+    assert!(changes.len() >= 9 && changes.iter().all(|change| change.since_part.is_multiple_of(15)), "{changes:?}");
+    let [parts, _, columns] = watch.size();
+    assert!(parts < 170 && columns <= 11 + 66, "{parts} parts, {columns} columns");
+}
+
+#[test]
+fn copied_rows_are_not_used_and_a_coarse_gauge_copies_nothing() {
+    let (document, parts) = process(&stream("r10-nothing-300.json"));
+    let mut parts = parts[..40].to_vec();
+    parts[34].measurements = parts[24].measurements.clone();
+    let (_, states) = replay(&document, &parts);
+    let unused: Vec<_> = states.iter().filter_map(|state| Some((state.number, state.unused?))).collect();
+    assert_eq!(unused, [(35, Unused::CopiedRows)]);
+    // Four rows to the micrometre agree by chance.
+    for part in &mut parts {
+        part.measurements.truncate(4);
+        for row in &mut part.measurements {
+            row.diameter_deviation_um = row.diameter_deviation_um.map(f64::round);
+        }
+    }
+    assert!(replay(&document, &parts).1.iter().all(|state| state.unused.is_none()));
+    parts[30].measurements.truncate(3);
+    assert_eq!(replay(&document, &parts).1[30].unused, Some(Unused::TooFewRows));
 }
 
 #[test]

@@ -70,6 +70,7 @@ mod whiten;
 
 pub(crate) use basis::cosine;
 pub(crate) use calculator::layout;
+pub(crate) use copies::digits_written;
 pub(crate) use discrepancy::spread_of_cosines;
 pub(crate) use evidence::log_sum_exp;
 pub(crate) use outlier::outliers;

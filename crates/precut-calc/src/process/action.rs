@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::memory::Memory;
 use super::outlook::Expected;
 use super::sight::{GAUGE, Sighting};
 use super::state::{Action, ActionKind, Change, ChangeVerdict, ChangedCause, Forecast};
-use super::watch::Memory;
 use crate::calculator::Limits;
 
 /// A new path only where the mean deviation is this much larger than what is unsure of it, and than what a part scatters.

@@ -97,7 +97,9 @@ fn of_part<M: Watched>(
             .with("part_type", part.part_type.clone())
             .with("known", known)
     });
-    M::faults_of_run(&part.conditions).into_iter().for_each(|fault| found.add(fault.under("/conditions")));
+    for fault in M::faults_of_run(&part.conditions) {
+        found.add(fault.under("/conditions"));
+    }
     let rows = part.measurements.len();
     found.require(rows <= MOST_ROWS, || too_large("/measurements", rows, MOST_ROWS));
     for (index, row) in part.measurements.iter().enumerate() {
@@ -107,7 +109,9 @@ fn of_part<M: Watched>(
             Finding::new("value_missing", pointer.clone()).with("quantity", document.quantity.clone())
         });
         let places = of_type.map_or_else(Vec::new, |of| M::faults_of_point(&of.job, &row.point()));
-        places.into_iter().for_each(|fault| found.add(fault.under(&pointer)));
+        for fault in places {
+            found.add(fault.under(&pointer));
+        }
     }
     for (index, check) in part.gauge_checks.iter().enumerate() {
         let (pointer, u) = (format!("/gauge_checks/{index}"), check.uncertainty_um);

@@ -1,15 +1,14 @@
 //! What to measure next, and what it would decide (`process/5`).
 
+use super::memory::Memory;
 use super::null::Gram;
 use super::sight::{COSINES, GAUGE, Sighting};
 use super::state::{ChangedCause, Measure};
-use super::watch::{Memory, PartOf, Watch};
+use super::watch::{PartOf, Watch};
 use crate::calculator::{Failure, Measurement, Monitor, Ranges, Rows, Watched};
 
 /// Standard uncertainty of a reading of a master, where none was stated, um.
 const MASTER_UM: f64 = 0.5;
-/// Everything that may be measured next.
-pub const MEASURE_CODES: &[&str] = &["master_on_gauge", "another_part", "other_part_type", "other_condition"];
 /// Of a Bayes factor beyond this nobody asks how large it is.
 const MOST: f64 = 1e6;
 

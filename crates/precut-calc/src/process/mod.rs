@@ -12,7 +12,8 @@
 //! - `detector`: when to say that something changed; parts that are odd by themselves (`process/3.3`);
 //! - `verdict`: which cause, since when, how large (`process/3.5`);
 //! - `outlook`, `action`, `measure`: the next part (`process/4`, `process/5`);
-//! - `watch`: all of it, part by part; `state`: what is said after each.
+//! - `memory`, `follow`: what is remembered of the parts, and of a change from its alarm on;
+//! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
 //!
 //! The state is a function of the document and of the parts in the order of their numbers, and of nothing else. It holds no
 //! more than the last [`onsets::WINDOW`] parts; older ones live on in the sums of `null`.
@@ -21,7 +22,9 @@ mod action;
 mod check;
 mod detector;
 mod document;
+mod follow;
 mod measure;
+mod memory;
 mod null;
 mod onsets;
 mod outlook;
@@ -36,7 +39,6 @@ mod watch;
 pub use action::ACTION_CODES;
 pub use check::{CODES as FAULT_CODES, faults};
 pub use document::{Document, GaugeCheck, MOST_PARTS, Options, Part, PartType, Threshold};
-pub use measure::MEASURE_CODES;
 pub use report::EXPLANATION_CODES;
 pub use state::*;
 pub use watch::{DocumentOf, PartOf, Watch};

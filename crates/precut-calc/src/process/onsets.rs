@@ -1,10 +1,10 @@
 //! Every cause since every part as one hypothesis (`process/3.2`, `process/3.3`).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::null::{Form, Null, Told};
 use super::sight::{COSINES, Catalogue};
-use super::sums::{Fit, Sums};
+use super::sums::{Fit, Sums, Waves};
 use crate::diagnosis::{log_sum_exp, spread_of_cosines};
 
 /// The last parts are all onsets; before them every fourth is, back to this many parts.
@@ -43,8 +43,8 @@ pub(super) struct Entry {
     /// square along the part, in the unit of the quantity.
     pub(super) mean: f64,
     pub(super) variance: f64,
-    /// Of cosines the means and the covariance of all.
-    pub(super) waves: Option<Box<(DVector<f64>, DMatrix<f64>)>>,
+    /// Of cosines all of them.
+    pub(super) waves: Option<Box<Waves>>,
 }
 
 /// What a hypothesis is about.
@@ -117,14 +117,12 @@ impl Scale<'_> {
             }
             if form == Form::Step {
                 for size in 0..SIZES.len() {
-                    let Some((log_bf, mean, covariance)) = sums.waves(&self.waves(size), &halved, null) else {
-                        continue;
-                    };
+                    let Some(waves) = sums.waves(&self.waves(size), &halved, null) else { continue };
                     let prior = weight * UNNAMED / SIZES.len() as f64;
-                    let (what, log_weight) = (What::Unnamed(size), prior.ln() + log_bf);
-                    let (own, variance) = rms(&mean, &covariance);
-                    let waves = Some(Box::new((mean, covariance)));
-                    hear(Entry { since, what, form, log_weight, mean: own, variance, waves }, &halved);
+                    let (what, log_weight) = (What::Unnamed(size), prior.ln() + waves.log_bf);
+                    let (mean, variance) = waves.rms();
+                    let waves = Some(Box::new(waves));
+                    hear(Entry { since, what, form, log_weight, mean, variance, waves }, &halved);
                 }
             }
         }
@@ -151,16 +149,8 @@ impl Scale<'_> {
         }
         for size in 0..SIZES.len() {
             let waves = sums.waves(&self.waves(size), &halved, null);
-            all.extend(waves.map(|(log_bf, ..)| (0.5 / SIZES.len() as f64).ln() + log_bf));
+            all.extend(waves.map(|waves| (0.5 / SIZES.len() as f64).ln() + waves.log_bf));
         }
         log_sum_exp(&all)
     }
-}
-
-/// Root mean square along the part of cosines with these sizes, and its variance.
-fn rms(mean: &DVector<f64>, covariance: &DMatrix<f64>) -> (f64, f64) {
-    let weighted = DVector::from_fn(COSINES, |k, _| if k == 0 { mean[k] } else { 0.5 * mean[k] });
-    let rms = mean.dot(&weighted).sqrt();
-    let slope = weighted / rms.max(f64::MIN_POSITIVE);
-    (rms, slope.dot(&(covariance * &slope)))
 }

@@ -1,14 +1,15 @@
 //! The next part: what is expected of it, averaged over all that may have changed (`process/4`).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::action;
 use super::measure;
+use super::memory::Memory;
 use super::null::{Null, Source, Told};
 use super::onsets::{Entry, What};
 use super::sight::{COSINES, Sighting};
 use super::state::{Forecast, Outlook, PathForecast};
-use super::watch::{Memory, Watch};
+use super::watch::Watch;
 use crate::calculator::{Failure, Limits, Monitor, Watched};
 use crate::diagnosis::log_sum_exp;
 use crate::num::stats::Resampler;
@@ -132,12 +133,10 @@ impl Memory {
                 Some((along * entry.mean, directions))
             }
             (What::Unnamed(_), Some(waves)) => {
-                let (mean, covariance) = waves.as_ref();
                 let all: Vec<DVector<f64>> =
                     part.signs.cosines.iter().enumerate().map(|(order, own)| column(order, Some(own))).collect();
                 let along = DMatrix::from_columns(&all);
-                let factor = Cholesky::new(covariance.clone())?.unpack();
-                Some((&along * mean, along * factor))
+                Some((&along * &waves.mean, waves.directions(&along)))
             }
             _ => None,
         }

@@ -49,6 +49,8 @@ fn cause(suspect: &Suspect, catalogue: &Catalogue) -> ChangedCause {
         What::Unnamed(_) => ("rms", "um", 1.0, [f64::NEG_INFINITY, f64::INFINITY]),
     };
     let at = |deviations: f64| (suspect.mean + deviations * suspect.deviation) * prior_sd;
+    // A root mean square is no less than nothing.
+    let least = if suspect.name.is_none() { 0.0 } else { f64::NEG_INFINITY };
     ChangedCause {
         kind: name.map_or("unnamed", |name| name.kind).to_owned(),
         label: name.map_or_else(String::new, |name| name.label.clone()),
@@ -60,7 +62,7 @@ fn cause(suspect: &Suspect, catalogue: &Catalogue) -> ChangedCause {
         parameter,
         unit,
         delta: at(0.0),
-        interval_95: [at(-NORMAL_95), at(NORMAL_95)],
+        interval_95: [at(-NORMAL_95).max(least), at(NORMAL_95)],
         at_bound: !(lower..=upper).contains(&at(0.0)),
         same_as_other: suspect.same_as_other,
     }

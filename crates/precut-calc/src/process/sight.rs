@@ -102,9 +102,12 @@ pub(super) struct Eye<M: Watched> {
     seen: Vec<Option<Before<M>>>,
 }
 
+/// Sweep and place of a row.
+type Place = (u32, Vec<(&'static str, Option<f64>)>);
+
 struct Before<M: Watched> {
     run: M::Run,
-    rows: Vec<(u32, Vec<(&'static str, Option<f64>)>)>,
+    rows: Vec<Place>,
     signs: Arc<Signs>,
 }
 

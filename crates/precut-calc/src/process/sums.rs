@@ -1,6 +1,6 @@
 //! Running sums over parts from an onset on, and the evidence that they hold (`process/3.2`).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::null::{DRIFT_PARTS, Form, Null, Told};
 use super::sight::COSINES;
@@ -91,25 +91,50 @@ impl Sums {
         Fit { log_bf: -0.5 * spread.ln() + 0.5 * s2 * b * b / spread, mean: s2 * b / spread, variance: s2 / spread }
     }
 
-    /// The same of all cosines with these prior standard deviations: ln BF, mean and covariance of the sizes.
-    pub(super) fn waves(
-        &self,
-        sd: &[f64],
-        halved: &DMatrix<f64>,
-        null: &Null,
-    ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
+    /// The same of all cosines with these prior standard deviations.
+    pub(super) fn waves(&self, sd: &[f64], halved: &DMatrix<f64>, null: &Null) -> Option<Waves> {
         let own = halved.columns(0, COSINES);
         let g = &self.waves - own.tr_mul(&own);
         let b = DVector::from_column_slice(&self.right[0][..COSINES]) - own.tr_mul(&null.half);
-        let s = DVector::from_column_slice(sd);
-        let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| f64::from(u8::from(i == j)) + s[i] * g[(i, j)] * s[j]);
+        let sd = DVector::from_column_slice(sd);
+        let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| f64::from(u8::from(i == j)) + sd[i] * g[(i, j)] * sd[j]);
         let factor = Cholesky::new(scaled)?;
-        let right = s.component_mul(&b);
+        let right = sd.component_mul(&b);
         let solved = factor.solve(&right);
         let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        let inverse = factor.inverse();
-        let covariance = DMatrix::from_fn(COSINES, COSINES, |i, j| s[i] * inverse[(i, j)] * s[j]);
-        Some((0.5 * right.dot(&solved) - log_det, s.component_mul(&solved), covariance))
+        let (log_bf, mean) = (0.5 * right.dot(&solved) - log_det, sd.component_mul(&solved));
+        Some(Waves { log_bf, mean, sd, factor })
+    }
+}
+
+/// All cosines on some parts.
+#[derive(Debug, Clone)]
+pub(super) struct Waves {
+    /// ln BF.
+    pub(super) log_bf: f64,
+    /// Posterior means of the sizes, in the unit of the quantity.
+    pub(super) mean: DVector<f64>,
+    /// Prior standard deviations, and the factor L of I + S G* S: the covariance is S (L L')^-1 S.
+    sd: DVector<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Waves {
+    /// Independent standard deviations of what these sizes do along columns, one size a column of them.
+    pub(super) fn directions(&self, along: &DMatrix<f64>) -> DMatrix<f64> {
+        let scaled = DMatrix::from_fn(COSINES, along.nrows(), |size, row| self.sd[size] * along[(row, size)]);
+        let half = self.factor.l_dirty().solve_lower_triangular(&scaled);
+        half.map_or_else(|| DMatrix::zeros(along.nrows(), COSINES), |half| half.transpose())
+    }
+
+    /// Root mean square along the part, and its variance.
+    pub(super) fn rms(&self) -> (f64, f64) {
+        let share = |k: usize| if k == 0 { 1.0 } else { 0.5 };
+        let weighted = DVector::from_fn(COSINES, |k, _| share(k) * self.mean[k]);
+        let rms = self.mean.dot(&weighted).sqrt();
+        let slope = weighted / rms.max(f64::MIN_POSITIVE);
+        let spread = self.directions(&DMatrix::from_row_slice(1, COSINES, slope.as_slice()));
+        (rms, spread.norm_squared())
     }
 }
 
@@ -134,10 +159,10 @@ mod tests {
     /// Two types, parts that miss rows, numbers that miss parts, a change that was accepted.
     fn stream() -> Stream {
         let mut random = Resampler::new(7, 0);
-        let numbers = (1..=24).filter(|number| number % 7 != 0);
+        let numbers = (1..=24).filter(|number: &u32| !number.is_multiple_of(7));
         let of = |number: u32| {
-            let kind = usize::from(number % 3 == 0);
-            let rows = if number % 5 == 0 { 6 } else { 9 + 2 * kind };
+            let kind = usize::from(number.is_multiple_of(3));
+            let rows = if number.is_multiple_of(5) { 6 } else { 9 + 2 * kind };
             (number, kind, DMatrix::from_fn(rows, COSINES + CAUSES + 1, |_, _| random.normal()))
         };
         let parts = numbers.map(of).collect();
@@ -150,7 +175,9 @@ mod tests {
     /// ln of the normal density of all rows under covariance I + sum of s^2 x x'.
     fn log_density(rows: &DVector<f64>, columns: &[DVector<f64>]) -> f64 {
         let mut covariance = DMatrix::identity(rows.len(), rows.len());
-        columns.iter().for_each(|column| covariance += column * column.transpose());
+        for column in columns {
+            covariance += column * column.transpose();
+        }
         let factor = Cholesky::new(covariance).unwrap();
         let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         -0.5 * rows.dot(&factor.solve(rows)) - log_det
@@ -215,7 +242,7 @@ mod tests {
                 }
             }
             let waves: Vec<(usize, f64)> = sd.iter().copied().enumerate().collect();
-            let (log_bf, ..) = sums.waves(&sd, &sums.halved(Form::Step, &null), &null).unwrap();
+            let log_bf = sums.waves(&sd, &sums.halved(Form::Step, &null), &null).unwrap().log_bf;
             assert!((log_bf - with(&waves, Form::Step)).abs() < 1e-9, "since {}", part.number);
         }
     }

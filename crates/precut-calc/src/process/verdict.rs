@@ -64,7 +64,9 @@ pub(super) fn judged(entries: &[Entry], catalogue: &Catalogue, parts: &[Told<'_>
         What::Unnamed(_) => unnamed,
     };
     let mut shares = vec![0.0; unnamed + 1];
-    entries.iter().for_each(|entry| shares[place(entry)] += share(entry));
+    for entry in entries {
+        shares[place(entry)] += share(entry);
+    }
     let suspect = |name: usize| {
         let own: Vec<&Entry> = entries.iter().filter(|entry| place(entry) == name).collect();
         let leader = own.iter().max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))?;
