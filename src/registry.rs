@@ -20,6 +20,7 @@ mod shape;
 mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
+mod watched;
 mod way;
 
 use entry::Member;
@@ -38,12 +39,13 @@ pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
 pub(crate) use shape::Shape;
+pub(crate) use watched::{NotReplayed, Replayed};
 pub(crate) use way::{forms, way};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar};
+use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar, Watched};
 use utoipa::openapi::{RefOr, Schema};
 
 /// Names under `/v1/` that the service itself uses: no calculator may have one of them.
@@ -186,5 +188,11 @@ impl Registrar for Offered {
     fn diagnosable<C: Diagnosable>(&mut self) {
         self.with_forward_model::<C>();
         self.diagnoses.push(Member { calculator: C::META.id, entry: Entry::of_diagnosis::<C>() });
+    }
+    fn watched<C: Watched>(&mut self) {
+        self.diagnosable::<C>();
+        if let Some(entry) = self.entries.pop() {
+            self.entries.push(entry.map(Entry::watching::<C>));
+        }
     }
 }

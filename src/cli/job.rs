@@ -99,18 +99,23 @@ pub(super) fn example(entry: &Entry, id: Option<&str>, bare: bool) -> Result<(),
     }
 }
 
-/// The calculator's name, the job with its tables, and what its names mean.
-fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Given), Failed> {
-    let bytes = if arguments.file.as_os_str() == "-" {
+/// What stands in a file, or comes from standard input where it is `-`.
+pub(super) fn bytes_of(file: &Path) -> Result<Vec<u8>, Failed> {
+    let bytes = if file.as_os_str() == "-" {
         if io::stdin().is_terminal() {
             eprintln!("reading the job from standard input; end it with Ctrl-D");
         }
         let mut bytes = Vec::new();
         io::stdin().read_to_end(&mut bytes).map(|_| bytes)
     } else {
-        std::fs::read(&arguments.file)
+        std::fs::read(file)
     };
-    let bytes = bytes.map_err(|error| Failed::Machine(named(&arguments.file, &error)))?;
+    bytes.map_err(|error| Failed::Machine(named(file, &error)))
+}
+
+/// The calculator's name, the job with its tables, and what its names mean.
+fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Given), Failed> {
+    let bytes = bytes_of(&arguments.file)?;
     let (calculator, job) = match &arguments.calculator {
         Some(calculator) => (calculator.clone(), bytes.into()),
         None => job_file(bytes)?,

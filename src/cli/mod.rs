@@ -4,6 +4,7 @@ mod backup;
 mod health;
 mod job;
 mod library;
+mod process;
 mod serve;
 
 use std::ffi::OsString;
@@ -37,6 +38,7 @@ Examples:
   precut materials 4140                           what a material brings along, by any of its names
   precut tools --search DNMG                      which tools are known
   precut solve job.json --library ours.toml       with machines and tools of one's own
+  precut process replay parts.json                what would have been said after each measured part
   precut check job.json                           every fault of a job at once
   precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
@@ -83,6 +85,8 @@ enum Command {
     Tools(library::RecordArgs),
     /// List the materials that a job may name, or show one
     Materials(library::RecordArgs),
+    /// A process under watch: what changed, since which part, and what to do before the next
+    Process(process::ProcessArgs),
     /// Print the JSON Schema of a calculator's job
     Schema {
         /// Name of the calculator, or `studies`
@@ -284,6 +288,7 @@ fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<()
         Some(Command::Machines(records)) => library::show(Kind::Machine, &records, language),
         Some(Command::Tools(records)) => library::show(Kind::Tool, &records, language),
         Some(Command::Materials(records)) => library::show(Kind::Material, &records, language),
+        Some(Command::Process(process)) => process::run(&process, registry, language),
         Some(Command::Schema { calculator, result }) => {
             let entry = entry(registry, &calculator)?;
             let document = if result { entry.output_document() } else { entry.input_document() };

@@ -31,6 +31,7 @@ mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
@@ -53,6 +54,7 @@ pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
 pub use study::STUDIES;
 pub(crate) use summary::Summary;
+pub(crate) use watch::replay;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
     Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Place,
-    Program, Table, Violations,
+    Program, Table, Violations, Watched,
 };
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
@@ -22,6 +22,7 @@ use super::contract::{self, Contract, Make};
 use super::place::{TablePlace, table_places};
 use super::schema::Components;
 use super::shape::Shape;
+use super::watched::{self, Replay};
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 use super::{family, names};
 
@@ -42,6 +43,8 @@ pub struct Entry {
     calculation: Box<dyn Calculation>,
     composed: bool,
     model_use: ModelUse,
+    /// Of a calculator whose process can be watched.
+    replay: Option<Replay>,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
 }
@@ -117,6 +120,16 @@ impl Entry {
         Ok(Self { model_use: ModelUse::OfJob, ..entry })
     }
 
+    /// The same with its process.
+    pub(super) fn watching<M: Watched>(self) -> Self {
+        Self { replay: Some(watched::replay::<M>), ..self }
+    }
+
+    /// The parts of a process one after another; `None` of a calculator whose process nobody watches.
+    pub(crate) fn replay(&self) -> Option<Replay> {
+        self.replay
+    }
+
     fn with_input<C: Calculator>(input: Make) -> Result<Self, RegistryError> {
         let meta = C::META;
         let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
@@ -176,6 +189,7 @@ impl Entry {
             calculation,
             composed: false,
             model_use: ModelUse::None,
+            replay: None,
             answer_bytes: AtomicUsize::new(0),
         }
     }

@@ -149,6 +149,16 @@ fn every_sentence_is_there_in_every_language() {
 }
 
 #[test]
+fn everything_that_a_watched_process_says_has_its_sentence() {
+    use precut_calc::process::{ACTION_CODES, EXPLANATION_CODES, FAULT_CODES};
+    let english = codes(Language::En);
+    let said = [("fault", FAULT_CODES), ("explanation", EXPLANATION_CODES), ("explanation", ACTION_CODES)];
+    let names = said.into_iter().flat_map(|(section, codes)| codes.iter().map(move |code| format!("{section}.{code}")));
+    let missing = names.filter(|name| !english.contains(name));
+    none(&missing.collect(), "codes of processes are not worded");
+}
+
+#[test]
 fn every_sentence_says_the_same_values_in_every_language() {
     let environment = &Texts::shared().environment;
     let asked = |language: Language, name: &str| -> BTreeSet<String> {

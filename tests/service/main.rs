@@ -36,4 +36,5 @@ mod standing;
 mod studies;
 mod traces;
 mod turning_programs;
+mod watched;
 mod webhooks;

@@ -17,6 +17,7 @@ pub mod machinability;
 pub mod material;
 pub mod num;
 pub mod path;
+pub mod process;
 pub mod program_compensation;
 pub mod ring_clamping;
 pub mod ring_roundness;
@@ -28,7 +29,7 @@ use calculator::Registrar;
 /// Every calculator, one line each. Nothing else has to change when one moves in: those that can be diagnosed make up
 /// the calculator `diagnosis`.
 pub fn register(registrar: &mut impl Registrar) {
-    registrar.diagnosable::<deflection_compensation::DeflectionCompensation>();
+    registrar.watched::<deflection_compensation::DeflectionCompensation>();
     registrar.diagnosable::<ring_roundness::RingRoundness>();
     registrar.calculator::<ring_roundness::evaluation::RoundnessEvaluation>();
     registrar.calculator::<ring_roundness::cylindricity::CylindricityEvaluation>();

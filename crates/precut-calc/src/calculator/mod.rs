@@ -17,6 +17,7 @@ mod program;
 mod ranges;
 mod table;
 mod user_formula;
+mod watched;
 
 pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxation};
 pub use consequence::{Allowed, Consequence};
@@ -34,6 +35,7 @@ pub use program::{Block, Dialect, Program, ProgramEnd};
 pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
 pub(crate) use user_formula::{FormulaRoom, values_of_formula};
+pub use watched::{Limits, Watched};
 
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
@@ -332,5 +334,9 @@ pub trait Registrar {
     /// A calculator whose model a diagnosis can compare with measurements.
     fn diagnosable<C: Diagnosable>(&mut self) {
         self.with_forward_model::<C>();
+    }
+    /// A calculator whose process can be watched part by part.
+    fn watched<C: Watched>(&mut self) {
+        self.diagnosable::<C>();
     }
 }

@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed,
-    checkpoint, values_by_name, values_of_formula,
+    JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
@@ -284,22 +284,8 @@ impl ForwardModel for DeflectionCompensation {
         let about = About { prepared, effects, monitor };
         let by_force = about.slope(|delta| DeflectionEffect::ForceLevel { delta })?;
         let by_bending = about.slope(|delta| DeflectionEffect::BendingScale { delta })?;
-        let along = about.slope_along()?;
         let scaled = |column: &[f64], by: f64| -> Vec<f64> { column.iter().map(|x| x * by).collect() };
-        let mut columns = Vec::new();
-        for run in &prepared.runs {
-            let within = |column: &[f64], by: f64| {
-                let mut of_run = vec![0.0; prepared.rows];
-                for &row in &run.row_of_station {
-                    of_run[row] = column[row] * by;
-                }
-                of_run
-            };
-            let ones = vec![prepared.measure.per_diameter_um(); prepared.rows];
-            columns.push(within(&ones, allowances.setup_diameter_um));
-            columns.push(within(&by_force, allowances.force_per_run_rel));
-            columns.push(within(&along, allowances.gauge_position_mm));
-        }
+        let mut columns = about.of_runs(&by_force, allowances)?;
         columns.push(scaled(&by_force, allowances.force_level_rel));
         columns.push(scaled(&by_bending, allowances.bending_rel));
         columns.extend(about.neglected_shear()?);
@@ -443,6 +429,36 @@ impl Diagnosable for DeflectionCompensation {
         ranges: Ranges<'_>,
     ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
         next_runs(job, rows, ranges)
+    }
+}
+
+impl Watched for DeflectionCompensation {
+    fn per_diameter_um(quantity: &str) -> f64 {
+        let deviates = Measure::named(quantity).filter(|measure| *measure != Measure::Diameter);
+        deviates.map_or(0.0, Measure::per_diameter_um)
+    }
+
+    fn scatter(
+        prepared: &PreparedDeflection,
+        effects: &[DeflectionEffect],
+        allowances: &DeflectionAllowances,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<JacobianColumn>, Failure> {
+        let about = About { prepared, effects, monitor };
+        about.of_runs(&about.slope(|delta| DeflectionEffect::ForceLevel { delta })?, allowances)
+    }
+
+    fn conditions(run: &DeflectionRun) -> Vec<(&'static str, Option<f64>)> {
+        vec![("tool_path_at_start_m", run.tool_path_at_start_m), ("warm_time_at_start_min", run.warm_time_at_start_min)]
+    }
+
+    fn path_m(run: &DeflectionRun) -> Option<f64> {
+        run.tool_path_at_start_m
+    }
+
+    fn limits(job: &Job) -> Limits {
+        let size = job.tolerance.size();
+        Limits { form_um: job.tolerance.form_um, lower_um: size.lower_um, upper_um: size.upper_um }
     }
 }
 
@@ -636,6 +652,27 @@ struct About<'a> {
 }
 
 impl About<'_> {
+    /// What is off in one run by itself: setting, force and place of the gauge, run by run.
+    fn of_runs(&self, by_force: &[f64], allowances: &DeflectionAllowances) -> Result<Vec<JacobianColumn>, Failure> {
+        let prepared = self.prepared;
+        let along = self.slope_along()?;
+        let ones = vec![prepared.measure.per_diameter_um(); prepared.rows];
+        let mut columns = Vec::new();
+        for run in &prepared.runs {
+            let mut within = |column: &[f64], by: f64| {
+                let mut of_run = vec![0.0; prepared.rows];
+                for &row in &run.row_of_station {
+                    of_run[row] = column[row] * by;
+                }
+                columns.push(of_run);
+            };
+            within(&ones, allowances.setup_diameter_um);
+            within(by_force, allowances.force_per_run_rel);
+            within(&along, allowances.gauge_position_mm);
+        }
+        Ok(columns)
+    }
+
     fn predicted(&self, runs: &[PreparedRun], effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
         predict(runs, self.prepared.rows, self.prepared.measure, effects, self.monitor)
     }

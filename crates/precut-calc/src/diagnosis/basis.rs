@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::calculator::Smooth;
 
 /// cos(k pi u).
-pub(super) fn cosine(order: usize, u: f64) -> f64 {
+pub(crate) fn cosine(order: usize, u: f64) -> f64 {
     (order as f64 * PI * u).cos()
 }
 

@@ -172,7 +172,7 @@ fn laid_out<M: Diagnosable>(
             value: vec![0.0; raw.len()],
             uncertainty: spreads,
             sides: Some(raw),
-            layout: layout::<M>(job, &used, design),
+            layout: layout(job.measurements.rows(), &used, design),
         },
     };
     let seen = readings.iter().map(|(_, reading)| Seen { class: reading.class, asks: reading.asks }).collect();
@@ -251,12 +251,11 @@ fn data<M: Diagnosable>(job: &JobOf<M>, used: &[usize], raw: Vec<f64>, design: D
         stated.into_iter().zip(&raw).map(relative).collect()
     });
     let value = raw.into_iter().map(|y| if logarithmic { y.max(f64::MIN_POSITIVE).ln() } else { y }).collect();
-    Data { value, uncertainty, sides: None, layout: layout::<M>(job, used, design) }
+    Data { value, uncertainty, sides: None, layout: layout(job.measurements.rows(), used, design) }
 }
 
 /// Sweep by sweep.
-fn layout<M: Diagnosable>(job: &JobOf<M>, used: &[usize], design: Design) -> Layout {
-    let rows = job.measurements.rows();
+pub(crate) fn layout<W: Measurement>(rows: &[W], used: &[usize], design: Design) -> Layout {
     let mut sweeps: Vec<((u32, u32), Vec<usize>)> = Vec::new();
     for (index, &row) in used.iter().enumerate() {
         let id = (rows[row].run(), rows[row].trace());

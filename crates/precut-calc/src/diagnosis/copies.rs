@@ -93,7 +93,7 @@ const MOST_DIGITS: usize = 12;
 
 /// The digit to which every value was written: the last decimal place that any of them has, or as many significant digits as
 /// the longest of them, whichever is coarser there.
-pub(super) fn digits_written(values: &[f64]) -> Vec<f64> {
+pub(crate) fn digits_written(values: &[f64]) -> Vec<f64> {
     // Number of significant digits, and the power of ten of the first.
     let of = |value: f64| {
         let text = format!("{:.*e}", MOST_DIGITS - 1, value.abs());

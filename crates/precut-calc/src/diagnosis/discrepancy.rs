@@ -116,6 +116,18 @@ impl Wave {
     }
 }
 
+/// Standard deviations of amplitudes, proportional to exp(-(k pi l)^2 / 2), whose pointwise variance is sigma^2.
+fn spread(waves: &[Wave], length: f64, sigma: f64) -> Vec<f64> {
+    let shape = |wave: &Wave| (-0.5 * (wave.order * PI * length).powi(2)).exp();
+    let variance: f64 = waves.iter().map(|wave| wave.share * shape(wave) * shape(wave)).sum();
+    waves.iter().map(|wave| sigma * shape(wave) / variance.sqrt()).collect()
+}
+
+/// The same of so many cosines along a part.
+pub(crate) fn spread_of_cosines(count: usize, length: f64, sigma: f64) -> Vec<f64> {
+    spread(&(0..count).map(Wave::of).collect::<Vec<_>>(), length, sigma)
+}
+
 /// The kinds of remainder that these rows can show. `unnamed`: what one unit of the effect does to the rows that the model
 /// has for what acts alike in all runs.
 pub(super) fn kinds(
@@ -232,11 +244,7 @@ impl Kind {
     /// Amplitudes with standard deviations proportional to exp(-(k pi l)^2 / 2), so that the pointwise
     /// variance is sigma^2.
     fn smooth(name: &'static str, columns: Vec<Sparse>, waves: &[Wave], likelihood: &Likelihood, sigma: f64) -> Self {
-        let spreads = LENGTHS.map(|length| {
-            let shape = |wave: &Wave| (-0.5 * (wave.order * PI * length).powi(2)).exp();
-            let variance: f64 = waves.iter().map(|wave| wave.share * shape(wave) * shape(wave)).sum();
-            waves.iter().map(|wave| sigma * shape(wave) / variance.sqrt()).collect()
-        });
+        let spreads = LENGTHS.map(|length| spread(waves, length, sigma));
         let halved = |wave: &Wave| if name == "around" { 0.5 * wave.order } else { wave.order };
         Self {
             orders: Some(waves.iter().map(halved).collect()),

@@ -182,7 +182,7 @@ pub(super) fn log_mean_exp(values: &[f64]) -> f64 {
 }
 
 /// ln of the sum of exponentials.
-pub(super) fn log_sum_exp(values: &[f64]) -> f64 {
+pub(crate) fn log_sum_exp(values: &[f64]) -> f64 {
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most == f64::NEG_INFINITY {
         return most;

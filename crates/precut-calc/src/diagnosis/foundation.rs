@@ -71,7 +71,7 @@ impl<'a> Foundation<'a> {
             // A class stands on one of two sides: none stands alone.
             return Ok(Outliers::default());
         }
-        outliers(self.data, &self.residual, monitor)
+        outliers(self.data, &self.residual, None, monitor)
     }
 
     /// Rows that the base predicts and that are not set aside.

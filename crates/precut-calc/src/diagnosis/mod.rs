@@ -68,6 +68,16 @@ mod view;
 mod weigh;
 mod whiten;
 
+pub(crate) use basis::cosine;
+pub(crate) use calculator::layout;
+pub(crate) use copies::digits_written;
+pub(crate) use discrepancy::spread_of_cosines;
+pub(crate) use evidence::log_sum_exp;
+pub(crate) use outlier::outliers;
+pub(crate) use signatures::Signatures;
+pub(crate) use sparse::Sparse;
+pub(crate) use whiten::Whitener;
+
 pub use adequacy::{Test, TestKind, adequacy};
 pub use base::Bound;
 pub use blunder::BlunderReport;

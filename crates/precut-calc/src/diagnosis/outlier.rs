@@ -46,8 +46,13 @@ impl Outliers {
 /// of it. Otherwise the row is part of a structure and stays.
 ///
 /// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
-/// 3 sigma with it and would pass for structure.
-pub(super) fn outliers(data: &Data, residual: &[f64], monitor: &dyn Monitor) -> Result<Outliers, Failure> {
+/// 3 sigma with it and would pass for structure. The scatter is that of all rows, unless it is `known` from elsewhere.
+pub(crate) fn outliers(
+    data: &Data,
+    residual: &[f64],
+    known: Option<f64>,
+    monitor: &dyn Monitor,
+) -> Result<Outliers, Failure> {
     let ordered = data.layout.design.smooth != Smooth::None;
     let mut traces: Vec<Fit> = if ordered {
         data.layout
@@ -66,7 +71,7 @@ pub(super) fn outliers(data: &Data, residual: &[f64], monitor: &dyn Monitor) -> 
     let most = (residual.len() / ONE_IN).max(1);
     let spread = loop {
         checkpoint(monitor)?;
-        let spread = robust_sd(traces.iter().flat_map(Fit::open_residuals));
+        let spread = known.unwrap_or_else(|| robust_sd(traces.iter().flat_map(Fit::open_residuals)));
         if spread <= 0.0 {
             break spread;
         }

@@ -9,46 +9,46 @@ use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, checkpoint};
 
 /// A hypothesis at one point of the grid of its shapes, linearised about one place in its sizes.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Variant {
+pub(crate) struct Variant {
     /// Which point of the grid; `None` where the shapes that are fitted are free, too.
-    pub(super) grid_point: Option<usize>,
+    pub(crate) grid_point: Option<usize>,
     /// Values with every size at 0, or where it is linearised.
-    pub(super) setting: Setting,
+    pub(crate) setting: Setting,
     /// What is free.
-    pub(super) free: Vec<Free>,
+    pub(crate) free: Vec<Free>,
     /// Column of what it does without a size of its own, or of what a straight line through the place of its
     /// linearisation does where every coordinate is 0.
-    pub(super) offset: Option<usize>,
+    pub(crate) offset: Option<usize>,
 }
 
 /// A free value of a variant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Free {
+pub(crate) struct Free {
     /// Index of the variable.
-    pub(super) variable: usize,
+    pub(crate) variable: usize,
     pub(super) coordinate: Coordinate,
     pub(super) side: Side,
     /// Which column among all, at one prior standard deviation.
-    pub(super) column: usize,
+    pub(crate) column: usize,
 }
 
 /// Signatures of all hypotheses before they are whitened: what a fold can use again.
 #[derive(Default)]
-pub(super) struct Signatures {
+pub(crate) struct Signatures {
     /// Variants of every hypothesis; the points of its grid first.
-    pub(super) variants: Vec<Vec<Variant>>,
+    pub(crate) variants: Vec<Vec<Variant>>,
     /// How many of them are points of its grid.
     pub(super) grid_points: Vec<usize>,
     /// Whether it was found off its grid, too.
     pub(super) is_off_grid: Vec<bool>,
     /// Columns at one prior standard deviation.
-    pub(super) columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Vec<f64>>,
 }
 
 impl Signatures {
     /// One Jacobian column for every amplitude at every point of the grids, and about the places beside 0. `residual` is
     /// measured minus base: it says which places are worth it where there are many.
-    pub(super) fn of(
+    pub(crate) fn of(
         subject: &dyn Subject,
         base: &[f64],
         residual: &[f64],

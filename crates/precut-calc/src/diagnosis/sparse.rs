@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 /// A column of which only what is not 0 is kept.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Sparse {
+pub(crate) struct Sparse {
     /// Rows that are not 0, ascending.
     rows: Vec<usize>,
     values: Vec<f64>,
@@ -19,7 +19,7 @@ impl Sparse {
         Self { rows, values, length }
     }
 
-    pub(super) fn of(dense: &[f64]) -> Self {
+    pub(crate) fn of(dense: &[f64]) -> Self {
         Self::new(dense.len(), dense.iter().copied().enumerate())
     }
 
@@ -54,7 +54,7 @@ impl Sparse {
     }
 
     /// Adds it, times a factor.
-    pub(super) fn add_to(&self, sum: &mut [f64], factor: f64) {
+    pub(crate) fn add_to(&self, sum: &mut [f64], factor: f64) {
         self.entries().for_each(|(row, value)| sum[row] += factor * value);
     }
 

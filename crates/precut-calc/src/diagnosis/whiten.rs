@@ -11,7 +11,7 @@ use super::sparse::Sparse;
 /// C^-1 as an inner product, without ever forming C: rows are decorrelated and divided by sigma, the few
 /// columns of N are then taken out by the identity (I + N N')^-1 = I - N (I + N'N)^-1 N'.
 #[derive(Debug, Clone)]
-pub(super) struct Whitener {
+pub(crate) struct Whitener {
     traces: Vec<Vec<usize>>,
     /// Trace of every row that counts.
     trace_of: Vec<Option<usize>>,
@@ -26,7 +26,7 @@ pub(super) struct Whitener {
 
 /// A column in whitened coordinates.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct White {
+pub(crate) struct White {
     own: Vec<f64>,
     /// What the allowances can explain of it.
     allowed: Vec<f64>,
@@ -39,7 +39,7 @@ impl White {
     }
 
     /// Row by row.
-    pub(super) fn own(&self) -> &[f64] {
+    pub(crate) fn own(&self) -> &[f64] {
         &self.own
     }
 
@@ -49,7 +49,7 @@ impl White {
     }
 
     /// a' C^-1 b.
-    pub(super) fn inner(&self, other: &Self) -> f64 {
+    pub(crate) fn inner(&self, other: &Self) -> f64 {
         dot(&self.own, &other.own) - dot(&self.allowed, &other.allowed)
     }
 
@@ -61,7 +61,7 @@ impl White {
 
 impl Whitener {
     /// `nuisances`: one standard deviation of every allowance, in the unit of the rows.
-    pub(super) fn new(data: &Data, noise: &Noise, nuisances: &[Sparse], keep: &[bool]) -> Self {
+    pub(crate) fn new(data: &Data, noise: &Noise, nuisances: &[Sparse], keep: &[bool]) -> Self {
         let traces: Vec<Vec<usize>> = data.layout.kept_traces(keep).into_iter().map(|(_, rows)| rows).collect();
         let sigma = noise.per_row.clone().unwrap_or_else(|| vec![noise.sigma; data.value.len()]);
         let mut trace_of = vec![None; data.value.len()];
@@ -104,7 +104,7 @@ impl Whitener {
     }
 
     /// ln |C| over the rows that count.
-    pub(super) fn log_det(&self) -> f64 {
+    pub(crate) fn log_det(&self) -> f64 {
         let of_scatter: f64 = self.traces.iter().flatten().map(|&row| 2.0 * self.sigma[row].ln()).sum();
         // Of a sweep of n rows |R| = (1 - rho^2)^(n - 1).
         let pairs: usize = self.traces.iter().map(|rows| rows.len().saturating_sub(1)).sum();
@@ -112,7 +112,7 @@ impl Whitener {
     }
 
     /// Number of rows that count.
-    pub(super) fn rows(&self) -> f64 {
+    pub(crate) fn rows(&self) -> f64 {
         self.rows as f64
     }
 
@@ -151,7 +151,7 @@ impl Whitener {
         self.traces.iter().map(|rows| rest.by_ref().take(rows.len()).collect()).collect()
     }
 
-    pub(super) fn white(&self, column: &[f64]) -> White {
+    pub(crate) fn white(&self, column: &[f64]) -> White {
         let own = self.decorrelate(column);
         let along =
             DVector::from_iterator(self.nuisances.len(), self.nuisances.iter().map(|nuisance| nuisance.dot(&own)));

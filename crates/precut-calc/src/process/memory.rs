@@ -1,0 +1,314 @@
+//! All that is remembered of the parts of a process, and how one more is taken.
+
+use std::collections::VecDeque;
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::document::{Options, Threshold};
+use super::follow::{Accepted, Pending};
+use super::null::{Column, Gram, Null, Older, Source, Told};
+use super::onsets::{Entry, Scale, WINDOW};
+use super::report;
+use super::scatter::Scatter;
+use super::sight::{COSINES, Catalogue, Sighting};
+use super::state::{Change, OddPart, ScatterReport, Score, Situation, State, Unused};
+use crate::calculator::{Failure, Monitor};
+use crate::diagnosis::{digits_written, outliers};
+
+/// A part of which more rows than this share stand alone is measured again.
+const MOST_ODD: f64 = 0.3;
+/// A warning is due from this share of the alarm on, or at this probability of the score.
+const WARNING: f64 = 0.1;
+const RARE: f64 = 0.001;
+/// From this log10 of the statistic beside its threshold on, something stirs.
+const STIRS: f64 = -0.5;
+/// Rows that agree with those of an earlier part with less than this probability were copied.
+const BY_CHANCE: f64 = 1e-9;
+/// Parts over which the scatter is watched.
+const SCORES: usize = 20;
+/// Scatter is learned anew after so many parts.
+const LEARN_AFTER: [usize; 3] = [40, 80, 160];
+/// Accepted changes that stand apart from the mean profile.
+const MOST_CHANGES: usize = 6;
+
+/// All that is remembered of the parts.
+pub(super) struct Memory {
+    pub(super) options: Options,
+    pub(super) noise: Option<f64>,
+    pub(super) catalogue: Catalogue,
+    pub(super) scatter: Option<Scatter>,
+    pub(super) columns: Vec<Column>,
+    pub(super) older: Older,
+    /// The last parts, by ascending number, with what they tell once the scatter is known.
+    pub(super) parts: VecDeque<(Sighting, Option<Gram>)>,
+    /// Parts that came, and parts that were used.
+    pub(super) came: usize,
+    pub(super) used: usize,
+    pub(super) learned_at: usize,
+    /// Only from this number on anything can have changed that is not in the model.
+    pub(super) first: u32,
+    pub(super) pending: Option<Pending>,
+    pub(super) accepted: Vec<Accepted>,
+    pub(super) reported: usize,
+    pub(super) changes: Vec<Change>,
+    pub(super) odd: Vec<OddPart>,
+    /// Number, distance and rows of the last parts.
+    pub(super) scores: VecDeque<(u32, f64, usize)>,
+    /// log10 of the statistic beside its threshold, after the part before.
+    pub(super) evidence: f64,
+}
+
+impl Memory {
+    /// Before the first part; `noise` is stated, in the unit of the quantity.
+    pub(super) fn new(options: Options, noise: Option<f64>) -> Self {
+        Self {
+            options,
+            noise,
+            catalogue: Catalogue::default(),
+            scatter: None,
+            columns: Vec::new(),
+            older: Older::none(),
+            parts: VecDeque::new(),
+            came: 0,
+            used: 0,
+            learned_at: 0,
+            first: 0,
+            pending: None,
+            accepted: Vec::new(),
+            reported: 0,
+            changes: Vec::new(),
+            odd: Vec::new(),
+            scores: VecDeque::new(),
+            evidence: f64::NEG_INFINITY,
+        }
+    }
+
+    pub(super) fn take(&mut self, mut part: Sighting, monitor: &dyn Monitor) -> Result<State, Failure> {
+        let number = part.number;
+        if self.is_copy(&part) {
+            return Ok(self.unused(number, Unused::CopiedRows));
+        }
+        self.free_up(&part);
+        let odd_rows = self.odd_rows(&part, monitor)?;
+        if odd_rows.len() as f64 > MOST_ODD * part.value.len() as f64 {
+            return Ok(self.unused(number, Unused::MeasureAgain));
+        }
+        for &row in &odd_rows {
+            part.keep[row] = false;
+        }
+        self.used += 1;
+        self.forget();
+        let score = self.score(&part);
+        let gram = self.scatter.as_ref().map(|scatter| Gram::of(&part, scatter, &self.catalogue));
+        self.parts.push_back((part, gram));
+        if self.scatter.is_none() {
+            if self.used < self.options.learning_parts as usize {
+                return Ok(self.said(number, Situation::Learning, None));
+            }
+            self.learn_first(monitor)?;
+        }
+        self.keep_pace(number, score);
+        self.learn_again();
+        let (situation, evidence) = self.follow(number);
+        self.evidence = evidence;
+        let rare = score.is_some_and(|score| score.p < RARE) || self.has_scatter_grown();
+        let warns = situation == Situation::InControl && (rare || evidence >= WARNING.log10());
+        let situation = if warns { Situation::Warning } else { situation };
+        let mut state = self.said(number, situation, Some(evidence));
+        state.score = score;
+        state.odd_rows = odd_rows;
+        Ok(state)
+    }
+
+    /// Whether an earlier part has the same rows to the last digit, and scatter would not let that happen.
+    fn is_copy(&self, part: &Sighting) -> bool {
+        let Some(scatter) = &self.scatter else { return false };
+        // Two normal numbers fall on the same digit d with d/(2 sigma sqrt(pi)).
+        let width = 2.0 * scatter.sigma * std::f64::consts::PI.sqrt();
+        let chance: f64 = digits_written(&part.value).iter().map(|digit| (digit / width).min(1.0)).product();
+        let is_same = |before: &Sighting| before.kind == part.kind && before.value == part.value;
+        chance < BY_CHANCE && self.parts.iter().any(|(before, _)| is_same(before))
+    }
+
+    /// Columns of what shows for the first time.
+    fn free_up(&mut self, part: &Sighting) {
+        let knows = |columns: &[Column], source: Source| columns.iter().any(|own| own.source == source);
+        if !knows(&self.columns, Source::Profile { kind: part.kind, order: 0 }) {
+            self.columns.extend(Column::profile(part.kind, part.signs.per_um));
+        }
+        for (variant, own) in self.catalogue.variants.iter().enumerate() {
+            let is_free = |column: &Column| column.source == Source::Cause(variant) && column.since.is_none();
+            if own.in_null && !self.columns.iter().any(is_free) {
+                self.columns.push(Column { source: Source::Cause(variant), since: None, sd: 1.0 });
+            }
+        }
+        // What came before shows nothing of a new cause.
+        let basic = COSINES + self.catalogue.variants.len() + 1;
+        if self.parts.iter().any(|(_, gram)| gram.as_ref().is_some_and(|gram| gram.inner.nrows() != basic)) {
+            self.look_again();
+        }
+    }
+
+    fn look_again(&mut self) {
+        let Some(scatter) = &self.scatter else { return };
+        for (part, gram) in &mut self.parts {
+            *gram = Some(Gram::of(part, scatter, &self.catalogue));
+        }
+    }
+
+    /// What the parts in memory that count tell.
+    pub(super) fn with_told<T>(&self, then: impl FnOnce(&Self, &[Told<'_>]) -> T) -> Option<T> {
+        self.scatter.as_ref()?;
+        let counts = self.parts.iter().filter(|(part, _)| !part.odd);
+        let told: Vec<Told<'_>> =
+            counts.filter_map(|(part, gram)| Some(Told::of(part, gram.as_ref()?, &self.columns))).collect();
+        Some(then(self, &told))
+    }
+
+    pub(super) fn null(&self, told: &[Told<'_>]) -> Option<Null> {
+        Null::of(&self.columns, &self.older, told.iter())
+    }
+
+    pub(super) fn scale(&self) -> Scale<'_> {
+        let sigma = self.scatter.as_ref().map_or(0.0, |scatter| scatter.sigma);
+        let thinned_weigh = self.options.threshold == Threshold::Calibrated;
+        Scale { catalogue: &self.catalogue, sigma, thinned_weigh }
+    }
+
+    pub(super) fn entries(&self, told: &[Told<'_>], first: u32) -> Vec<Entry> {
+        self.null(told).map_or_else(Vec::new, |null| self.scale().entries(told, &null, first))
+    }
+
+    /// Everything that the outlook needs: what the parts tell, and what is free.
+    pub(super) fn with_null<T>(&self, then: impl FnOnce(&[Told<'_>], &Null) -> T) -> Option<T> {
+        self.with_told(|memory, told| memory.null(told).map(|null| then(told, &null))).flatten()
+    }
+
+    /// Rows that stand alone beside what was expected of the part.
+    fn odd_rows(&self, part: &Sighting, monitor: &dyn Monitor) -> Result<Vec<usize>, Failure> {
+        let Some(scatter) = &self.scatter else { return Ok(Vec::new()) };
+        let Some(expected) = self.with_null(|_, null| {
+            let mean = null.mean();
+            let mut expected = vec![0.0; part.value.len()];
+            for (size, column) in mean.iter().zip(null.rows_of(part)) {
+                expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
+            }
+            expected
+        }) else {
+            return Ok(Vec::new());
+        };
+        let left: Vec<f64> = part.residual.iter().zip(expected).map(|(r, e)| r - e).collect();
+        let mut rows = outliers(&part.data(), &left, Some(scatter.sigma), monitor)?.rows;
+        rows.sort_unstable();
+        Ok(rows)
+    }
+
+    /// Parts that are too old live on in what is known of what is free.
+    fn forget(&mut self) {
+        while self.parts.front().is_some_and(|(part, _)| self.came - part.ordinal > WINDOW) {
+            let Some((part, gram)) = self.parts.pop_front() else { return };
+            if let (false, Some(gram)) = (part.odd, &gram) {
+                self.older.take(&Told::of(&part, gram, &self.columns), self.options.memory());
+            }
+        }
+        while self.accepted.len() > MOST_CHANGES {
+            self.close(&self.accepted[0].id.clone());
+        }
+    }
+
+    /// The part against what those before it let expect.
+    fn score(&self, part: &Sighting) -> Option<Score> {
+        let scatter = self.scatter.as_ref()?;
+        let gram = Gram::of(part, scatter, &self.catalogue);
+        let told = Told::of(part, &gram, &self.columns);
+        let (chi2, [z_mean, z_taper, z_bow]) = self.with_null(|_, null| null.distance(&told)).flatten()?;
+        let degrees = gram.rows;
+        let p = ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi2));
+        Some(Score { chi2, degrees, p, z_mean, z_taper, z_bow })
+    }
+
+    fn keep_pace(&mut self, number: u32, score: Option<Score>) {
+        self.scores.extend(score.map(|score| (number, score.chi2, score.degrees)));
+        while self.scores.len() > SCORES {
+            self.scores.pop_front();
+        }
+    }
+
+    fn has_scatter_grown(&self) -> bool {
+        let sum = |(sum, all), (_, chi2, own): &(u32, f64, usize)| (sum + chi2, all + own);
+        let (chi2, degrees) = self.scores.iter().fold((0.0, 0), sum);
+        let by_chance = ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi2));
+        self.scores.len() == SCORES && by_chance < RARE
+    }
+
+    pub(super) fn learn_first(&mut self, monitor: &dyn Monitor) -> Result<(), Failure> {
+        let parts: Vec<Sighting> = self.parts.iter().map(|(part, _)| part.clone()).collect();
+        let first = Scatter::first(&parts, self.noise);
+        for (part, _) in &mut self.parts {
+            let rows = outliers(&part.data(), &part.residual, Some(first.sigma), monitor)?.rows;
+            if rows.len() as f64 <= MOST_ODD * part.value.len() as f64 {
+                for row in rows {
+                    part.keep[row] = false;
+                }
+            }
+        }
+        self.scatter = Some(first);
+        self.learn();
+        Ok(())
+    }
+
+    pub(super) fn learn(&mut self) {
+        self.look_again();
+        let counts = self.parts.iter().filter(|(part, _)| !part.odd).map(|(part, _)| part.clone());
+        let parts: Vec<Sighting> = counts.collect();
+        let learned = self.with_null(|_, null| {
+            let scatter = self.scatter.as_ref();
+            scatter.map(|scatter| scatter.learned(&parts, null, self.noise))
+        });
+        if let Some(learned) = learned.flatten() {
+            self.scatter = Some(learned);
+            self.learned_at = self.used;
+            self.look_again();
+        }
+    }
+
+    /// Once more while nothing stirs: what changes would pass for scatter.
+    pub(super) fn learn_again(&mut self) {
+        let due = LEARN_AFTER.iter().any(|&after| after <= self.used && after > self.learned_at);
+        if due && self.pending.is_none() && self.evidence < STIRS {
+            self.learn();
+        }
+    }
+
+    pub(super) fn unused(&self, number: u32, why: Unused) -> State {
+        let situation = match (&self.scatter, &self.pending) {
+            (None, _) => Situation::Learning,
+            (_, Some(_)) => Situation::Changed,
+            _ => Situation::InControl,
+        };
+        State { unused: Some(why), ..self.said(number, situation, None) }
+    }
+
+    pub(super) fn said(&self, number: u32, state: Situation, evidence: Option<f64>) -> State {
+        let scatter = self.scatter.as_ref().map(|scatter| ScatterReport {
+            sigma: scatter.sigma,
+            correlation: scatter.rho,
+            allowance_factors: scatter.factors.clone(),
+        });
+        let change = self.changes.last().filter(|_| state == Situation::Changed).cloned();
+        let said = State {
+            number,
+            state,
+            unused: None,
+            score: None,
+            evidence: evidence.filter(|evidence| evidence.is_finite()),
+            scatter,
+            change,
+            changes: self.changes.clone(),
+            odd_parts: self.odd.clone(),
+            odd_rows: Vec::new(),
+            explanation: Vec::new(),
+        };
+        State { explanation: report::explanation(&said, &self.options), ..said }
+    }
+}

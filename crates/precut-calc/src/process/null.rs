@@ -1,0 +1,270 @@
+//! What is free although nothing changed, and what the parts tell of it (`process/3.1`).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::scatter::Scatter;
+use super::sight::{COSINES, Catalogue, Sighting};
+use crate::diagnosis::Whitener;
+
+/// Prior standard deviation of each cosine of the mean profile, um on the diameter.
+const PROFILE_UM: f64 = 10.0;
+/// A drift is as large as its cause's prior after so many parts.
+pub(super) const DRIFT_PARTS: f64 = 20.0;
+
+/// A column that is free in every part, with a standard normal size.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Column {
+    pub(super) source: Source,
+    /// From which part on it acts, and whether it grows from there.
+    pub(super) since: Option<(u32, Form)>,
+    /// Prior standard deviation, in units of its column.
+    pub(super) sd: f64,
+}
+
+/// What a column is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Source {
+    /// A cosine of the mean profile of one type of parts.
+    Profile { kind: usize, order: usize },
+    /// A cosine, whatever the part.
+    Wave(usize),
+    /// A variant of a cause.
+    Cause(usize),
+}
+
+/// How something changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    Step,
+    Drift,
+}
+
+impl Form {
+    /// g: how much of a change since a part acts in a later one.
+    pub(super) fn of(self, number: u32, since: u32) -> f64 {
+        match self {
+            _ if number < since => 0.0,
+            Self::Step => 1.0,
+            Self::Drift => (f64::from(number - since) + 1.0) / DRIFT_PARTS,
+        }
+    }
+}
+
+impl Column {
+    /// The mean profile of a type of parts.
+    pub(super) fn profile(kind: usize, per_um: f64) -> impl Iterator<Item = Self> {
+        let of = move |order| Self { source: Source::Profile { kind, order }, since: None, sd: PROFILE_UM * per_um };
+        (0..COSINES).map(of)
+    }
+
+    /// How much of its basic column acts in a part.
+    pub(super) fn weight(&self, kind: usize, number: u32) -> f64 {
+        let is_own = !matches!(self.source, Source::Profile { kind: own, .. } if own != kind);
+        let acts = self.since.map_or(1.0, |(since, form)| form.of(number, since));
+        if is_own { self.sd * acts } else { 0.0 }
+    }
+
+    /// Which of the basic columns it is.
+    pub(super) fn basic(&self) -> usize {
+        match self.source {
+            Source::Profile { order, .. } | Source::Wave(order) => order,
+            Source::Cause(variant) => COSINES + variant,
+        }
+    }
+}
+
+/// Inner products of all basic columns of a part, whitened: cosines, variants of causes, and last what was measured beside the
+/// prediction.
+#[derive(Clone)]
+pub(super) struct Gram {
+    pub(super) inner: DMatrix<f64>,
+    /// How many rows it stands for, with the readings of a master.
+    pub(super) rows: usize,
+}
+
+impl Gram {
+    pub(super) fn of(part: &Sighting, scatter: &Scatter, catalogue: &Catalogue) -> Self {
+        let data = part.data();
+        let whitener = Whitener::new(&data, &scatter.noise(), &part.scatter(&scatter.factors), &part.keep);
+        let last = COSINES + catalogue.variants.len();
+        let mut white = vec![None; last + 1];
+        for (order, column) in part.signs.cosines.iter().enumerate() {
+            white[order] = Some(whitener.white(column));
+        }
+        for (variant, column) in &part.signs.causes {
+            white[COSINES + variant] = Some(whitener.white(column));
+        }
+        white[last] = Some(whitener.white(&part.residual));
+        let mut inner = DMatrix::zeros(last + 1, last + 1);
+        for i in 0..=last {
+            for j in 0..=i {
+                if let (Some(a), Some(b)) = (&white[i], &white[j]) {
+                    inner[(i, j)] = a.inner(b);
+                    inner[(j, i)] = inner[(i, j)];
+                }
+            }
+        }
+        if let Some(gauge) = catalogue.gauge() {
+            let of_gauge = COSINES + gauge;
+            for check in &part.checks {
+                // A master reads what the gauge is off, on the diameter, and nothing of the part.
+                let (reads, read) = (2.0 * catalogue.variants[gauge].prior_sd, check.measured_um);
+                let weight = check.uncertainty_um.powi(-2);
+                inner[(of_gauge, of_gauge)] += weight * reads * reads;
+                inner[(of_gauge, last)] += weight * reads * read;
+                inner[(last, of_gauge)] += weight * reads * read;
+                inner[(last, last)] += weight * read * read;
+            }
+        }
+        Self { inner, rows: part.keep.iter().filter(|keep| **keep).count() + part.checks.len() }
+    }
+
+    pub(super) fn residual(&self) -> usize {
+        self.inner.nrows() - 1
+    }
+}
+
+/// A part with what it tells.
+pub(super) struct Told<'a> {
+    pub(super) number: u32,
+    pub(super) ordinal: usize,
+    pub(super) gram: &'a Gram,
+    /// Weight and basic column of everything that is free.
+    pub(super) free: Vec<(f64, usize)>,
+}
+
+impl<'a> Told<'a> {
+    pub(super) fn of(part: &Sighting, gram: &'a Gram, columns: &[Column]) -> Self {
+        let free = columns.iter().map(|column| (column.weight(part.kind, part.number), column.basic())).collect();
+        Self { number: part.number, ordinal: part.ordinal, gram, free }
+    }
+
+    /// B'c of a basic column c.
+    pub(super) fn along(&self, basic: usize) -> impl Iterator<Item = f64> + '_ {
+        self.free
+            .iter()
+            .map(move |&(weight, own)| if weight == 0.0 { 0.0 } else { weight * self.gram.inner[(own, basic)] })
+    }
+
+    /// B'B, added.
+    fn add_to(&self, a: &mut DMatrix<f64>, eta: &mut DVector<f64>) {
+        let last = self.gram.residual();
+        for (i, &(weight, own)) in self.free.iter().enumerate() {
+            if weight == 0.0 {
+                continue;
+            }
+            for (j, along) in self.along(own).enumerate() {
+                a[(i, j)] += weight * along;
+            }
+            eta[i] += weight * self.gram.inner[(own, last)];
+        }
+    }
+}
+
+/// What parts that left the memory still tell: A and eta without the prior.
+#[derive(Debug, Clone)]
+pub(super) struct Older {
+    pub(super) a: DMatrix<f64>,
+    pub(super) eta: DVector<f64>,
+}
+
+impl Older {
+    pub(super) fn none() -> Self {
+        Self { a: DMatrix::zeros(0, 0), eta: DVector::zeros(0) }
+    }
+
+    /// With a part more, everything before it counting a little less.
+    pub(super) fn take(&mut self, part: &Told<'_>, memory: f64) {
+        let count = part.free.len();
+        let stays = 1.0 - 1.0 / memory;
+        self.a = self.a.clone().resize(count, count, 0.0) * stays;
+        self.eta = self.eta.clone().resize_vertically(count, 0.0) * stays;
+        part.add_to(&mut self.a, &mut self.eta);
+    }
+
+    /// Without one column.
+    pub(super) fn without(&self, gone: &[bool]) -> Self {
+        let kept: Vec<usize> = (0..self.eta.len()).filter(|&k| !gone[k]).collect();
+        Self {
+            a: DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.a[(kept[i], kept[j])]),
+            eta: DVector::from_fn(kept.len(), |i, _| self.eta[kept[i]]),
+        }
+    }
+}
+
+/// What is free, and what is known of it: A0 = I + sum B'B, eta = sum B'r.
+pub(super) struct Null {
+    pub(super) columns: Vec<Column>,
+    /// Of A0.
+    pub(super) factor: Cholesky<f64, Dyn>,
+    /// L^-1 eta.
+    pub(super) half: DVector<f64>,
+}
+
+impl Null {
+    /// From older parts and those in memory.
+    pub(super) fn of<'a>(columns: &[Column], older: &Older, parts: impl Iterator<Item = &'a Told<'a>>) -> Option<Self> {
+        let count = columns.len();
+        let mut a = older.a.clone().resize(count, count, 0.0) + DMatrix::identity(count, count);
+        let mut eta = older.eta.clone().resize_vertically(count, 0.0);
+        parts.for_each(|part| part.add_to(&mut a, &mut eta));
+        let factor = Cholesky::new(a)?;
+        let half = factor.l_dirty().solve_lower_triangular(&eta)?;
+        Some(Self { columns: columns.to_vec(), factor, half })
+    }
+
+    /// L^-1 c.
+    pub(super) fn halved(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
+        self.factor.l_dirty().solve_lower_triangular(c).unwrap_or_else(|| c.clone())
+    }
+
+    /// Posterior mean of what is free.
+    pub(super) fn mean(&self) -> DVector<f64> {
+        self.back(&self.half)
+    }
+
+    /// L'^-1 c.
+    pub(super) fn back(&self, c: &DVector<f64>) -> DVector<f64> {
+        self.factor.l_dirty().tr_solve_lower_triangular(c).unwrap_or_else(|| c.clone())
+    }
+
+    /// What is free in a part, row by row, before it is whitened.
+    pub(super) fn rows_of(&self, part: &Sighting) -> Vec<Vec<f64>> {
+        self.columns.iter().map(|column| row_column(column, part)).collect()
+    }
+
+    /// Mahalanobis distance of a part to its prediction from what is known here, the part itself not in it: chi2 with as many
+    /// degrees as it has rows; and how far its mean, taper and bow lie, in standard deviations.
+    pub(super) fn distance(&self, part: &Told<'_>) -> Option<(f64, [f64; 3])> {
+        let (last, count) = (part.gram.residual(), part.free.len());
+        let mean = self.mean();
+        let free = |basic: usize| DVector::from_iterator(count, part.along(basic));
+        let (mut own, mut none) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        part.add_to(&mut own, &mut none);
+        // e = r - B beta: e'e and B'e.
+        let to_r = free(last);
+        let left = &to_r - &own * &mean;
+        let square = part.gram.inner[(last, last)] - mean.dot(&to_r) - mean.dot(&left);
+        let all = self.factor.l() * self.factor.l().transpose() + own;
+        let all = Cholesky::new(all)?;
+        // (I + B A^-1 B')^-1 = I - B (A + B'B)^-1 B'.
+        let chi2 = square - left.dot(&all.solve(&left));
+        let shape = |order: usize| {
+            let along = free(order);
+            let size = part.gram.inner[(order, last)] - along.dot(&mean);
+            let unsure = self.halved(&DMatrix::from_columns(std::slice::from_ref(&along)));
+            size / (part.gram.inner[(order, order)] + unsure.norm_squared()).sqrt()
+        };
+        Some((chi2.max(0.0), [0, 1, 2].map(shape)))
+    }
+}
+
+/// A free column in the rows of a part.
+fn row_column(column: &Column, part: &Sighting) -> Vec<f64> {
+    let weight = column.weight(part.kind, part.number);
+    let basic = match column.source {
+        Source::Profile { order, .. } | Source::Wave(order) => Some(&part.signs.cosines[order]),
+        Source::Cause(variant) => part.signs.causes.iter().find(|(own, _)| *own == variant).map(|(_, column)| column),
+    };
+    basic.map_or_else(|| vec![0.0; part.residual.len()], |column| column.iter().map(|x| weight * x).collect())
+}

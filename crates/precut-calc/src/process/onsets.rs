@@ -1,0 +1,156 @@
+//! Every cause since every part as one hypothesis (`process/3.2`, `process/3.3`).
+
+use nalgebra::DMatrix;
+
+use super::null::{Form, Null, Told};
+use super::sight::{COSINES, Catalogue};
+use super::sums::{Fit, Sums, Waves};
+use crate::diagnosis::{log_sum_exp, spread_of_cosines};
+
+/// The last parts are all onsets; before them every fourth is, back to this many parts.
+const ALL: usize = 40;
+pub(super) const WINDOW: usize = 160;
+const EVERY: usize = 4;
+/// Shares of the names by a step and by a drift, and of what has no name.
+const STEPS: f64 = 0.65;
+const DRIFTS: f64 = 0.20;
+const UNNAMED: f64 = 0.15;
+/// Sizes of a step, in prior standard deviations of its cause.
+const SCALES: [f64; 2] = [0.2, 1.0];
+/// Pointwise sizes of what has no name, in standard deviations of a reading, and its correlation length along the part.
+const SIZES: [f64; 3] = [1.0, 3.0, 10.0];
+const LENGTH: f64 = 0.08;
+
+/// What is weighed over onsets and causes.
+pub(super) struct Scale<'a> {
+    pub(super) catalogue: &'a Catalogue,
+    /// Standard deviation of a reading.
+    pub(super) sigma: f64,
+    /// Onsets that stand for several weigh as much as these.
+    pub(super) thinned_weigh: bool,
+}
+
+/// A hypothesis with its evidence.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    /// The part since which it acts.
+    pub(super) since: u32,
+    pub(super) what: What,
+    pub(super) form: Form,
+    /// ln of weight times Bayes factor.
+    pub(super) log_weight: f64,
+    /// Posterior mean and variance of its size: of a cause in prior standard deviations of its variant, of cosines root mean
+    /// square along the part, in the unit of the quantity.
+    pub(super) mean: f64,
+    pub(super) variance: f64,
+    /// Of cosines all of them.
+    pub(super) waves: Option<Box<Waves>>,
+}
+
+/// What a hypothesis is about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum What {
+    /// A variant of a cause.
+    Cause(usize),
+    /// All cosines, of one of [`SIZES`].
+    Unnamed(usize),
+}
+
+/// Who is told of hypotheses.
+pub(super) type Hear<'h> = &'h mut dyn FnMut(Entry, &DMatrix<f64>);
+
+impl Scale<'_> {
+    /// Prior standard deviations of the cosines of something without a name.
+    pub(super) fn waves(&self, size: usize) -> Vec<f64> {
+        spread_of_cosines(COSINES, LENGTH, SIZES[size] * self.sigma)
+    }
+
+    /// Everything that may have changed since the parts from `first` on; `hear` is given each hypothesis with L^-1 c of all
+    /// basic columns.
+    pub(super) fn each(&self, parts: &[Told<'_>], null: &Null, first: u32, hear: Hear<'_>) {
+        let Some(newest) = parts.last() else { return };
+        let basic = newest.gram.residual();
+        let shares = self.catalogue.shares();
+        let mut sums = Sums::none(null.columns.len(), basic);
+        let mut next: Option<u32> = None;
+        for part in parts.iter().rev() {
+            if part.number < first {
+                break;
+            }
+            sums.earlier(next.map_or(0.0, |next| f64::from(next - part.number)));
+            sums.begin_with(part);
+            next = Some(part.number);
+            let weight = self.onset(newest.ordinal - part.ordinal, part.ordinal);
+            if weight > 0.0 {
+                self.since(part.number, weight, &sums, null, &shares, hear);
+            }
+        }
+    }
+
+    /// Weight of an onset so many parts ago; 0 where it is left to another one.
+    fn onset(&self, age: usize, ordinal: usize) -> f64 {
+        match age {
+            _ if age < ALL => 1.0,
+            // It stands for itself and those before it: that all parts alike have something is no change.
+            _ if age < WINDOW && (ordinal + 1).is_multiple_of(EVERY) => {
+                if self.thinned_weigh {
+                    EVERY as f64
+                } else {
+                    1.0
+                }
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn since(&self, since: u32, weight: f64, sums: &Sums, null: &Null, shares: &[f64], hear: Hear<'_>) {
+        for (form, share, scales) in [(Form::Step, STEPS, SCALES.as_slice()), (Form::Drift, DRIFTS, &SCALES[1..])] {
+            let halved = sums.halved(form, null);
+            for (variant, own) in shares.iter().enumerate() {
+                let prior = weight * share * own / scales.len() as f64;
+                for &scale in scales {
+                    let fit = sums.one(COSINES + variant, form, scale, &halved, null);
+                    let (what, log_weight) = (What::Cause(variant), prior.ln() + fit.log_bf);
+                    let Fit { mean, variance, .. } = fit;
+                    hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
+                }
+            }
+            if form == Form::Step {
+                for size in 0..SIZES.len() {
+                    let Some(waves) = sums.waves(&self.waves(size), &halved, null) else { continue };
+                    let prior = weight * UNNAMED / SIZES.len() as f64;
+                    let (what, log_weight) = (What::Unnamed(size), prior.ln() + waves.log_bf);
+                    let (mean, variance) = waves.rms();
+                    let waves = Some(Box::new(waves));
+                    hear(Entry { since, what, form, log_weight, mean, variance, waves }, &halved);
+                }
+            }
+        }
+    }
+
+    /// All of it.
+    pub(super) fn entries(&self, parts: &[Told<'_>], null: &Null, first: u32) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        self.each(parts, null, first, &mut |entry, _| entries.push(entry));
+        entries
+    }
+
+    /// ln of the Bayes factor of "this part alone is off": by any cause, half the weight, or by cosines.
+    pub(super) fn log_alone(&self, part: &Told<'_>, null: &Null) -> f64 {
+        let shares = self.catalogue.shares();
+        let mut sums = Sums::none(null.columns.len(), part.gram.residual());
+        sums.begin_with(part);
+        let halved = sums.halved(Form::Step, null);
+        let mut all = Vec::new();
+        for (variant, own) in shares.iter().enumerate() {
+            let prior = 0.5 * own / SCALES.len() as f64;
+            let fits = SCALES.map(|scale| sums.one(COSINES + variant, Form::Step, scale, &halved, null).log_bf);
+            all.extend(fits.map(|log_bf| prior.ln() + log_bf));
+        }
+        for size in 0..SIZES.len() {
+            let waves = sums.waves(&self.waves(size), &halved, null);
+            all.extend(waves.map(|waves| (0.5 / SIZES.len() as f64).ln() + waves.log_bf));
+        }
+        log_sum_exp(&all)
+    }
+}

@@ -1,0 +1,249 @@
+//! Running sums over parts from an onset on, and the evidence that they hold (`process/3.2`).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::null::{DRIFT_PARTS, Form, Null, Told};
+use super::sight::COSINES;
+
+/// G, b and c of every basic column over the parts since an onset, for a step and for a drift; of the cosines all products.
+pub(super) struct Sums {
+    /// X'X of every column alone: times 1, times n - tau + 1, and times its square.
+    square: [Vec<f64>; 3],
+    /// X'r: times 1, and times n - tau + 1.
+    right: [Vec<f64>; 2],
+    /// B'X, likewise.
+    free: [DMatrix<f64>; 2],
+    /// X'X of the cosines.
+    waves: DMatrix<f64>,
+}
+
+/// One column on some parts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fit {
+    /// ln BF.
+    pub(super) log_bf: f64,
+    /// Size in prior standard deviations at scale 1: its posterior mean.
+    pub(super) mean: f64,
+    pub(super) variance: f64,
+}
+
+impl Sums {
+    pub(super) fn none(free: usize, basic: usize) -> Self {
+        let zeros = || vec![0.0; basic];
+        Self {
+            square: [zeros(), zeros(), zeros()],
+            right: [zeros(), zeros()],
+            free: [DMatrix::zeros(free, basic), DMatrix::zeros(free, basic)],
+            waves: DMatrix::zeros(COSINES, COSINES),
+        }
+    }
+
+    /// The onset moves so many parts back: (k + d)^2 = k^2 + 2 d k + d^2.
+    pub(super) fn earlier(&mut self, by: f64) {
+        let [one, first, second] = &mut self.square;
+        for ((second, first), one) in second.iter_mut().zip(first.iter_mut()).zip(one.iter()) {
+            *second += by * (2.0 * *first + by * one);
+            *first += by * one;
+        }
+        let [one, first] = &mut self.right;
+        first.iter_mut().zip(one.iter()).for_each(|(first, one)| *first += by * one);
+        let [one, first] = &mut self.free;
+        first.zip_apply(&*one, |first, one| *first += by * one);
+    }
+
+    /// A part with which it begins.
+    pub(super) fn begin_with(&mut self, part: &Told<'_>) {
+        let (inner, last) = (&part.gram.inner, part.gram.residual());
+        for basic in 0..last {
+            self.square.iter_mut().for_each(|sums| sums[basic] += inner[(basic, basic)]);
+            self.right.iter_mut().for_each(|sums| sums[basic] += inner[(basic, last)]);
+        }
+        for (k, &(weight, own)) in part.free.iter().enumerate() {
+            if weight == 0.0 {
+                continue;
+            }
+            for basic in 0..last {
+                let product = weight * inner[(own, basic)];
+                self.free.iter_mut().for_each(|sums| sums[(k, basic)] += product);
+            }
+        }
+        self.waves += inner.view((0, 0), (COSINES, COSINES));
+    }
+
+    /// L^-1 c of every basic column.
+    pub(super) fn halved(&self, form: Form, null: &Null) -> DMatrix<f64> {
+        match form {
+            Form::Step => null.halved(&self.free[0]),
+            Form::Drift => null.halved(&(&self.free[1] / DRIFT_PARTS)),
+        }
+    }
+
+    /// ln BF = -1/2 ln(1 + s^2 G*) + 1/2 s^2 b*^2/(1 + s^2 G*), of one column of prior standard deviation s.
+    pub(super) fn one(&self, basic: usize, form: Form, scale: f64, halved: &DMatrix<f64>, null: &Null) -> Fit {
+        let (g, b) = match form {
+            Form::Step => (self.square[0][basic], self.right[0][basic]),
+            Form::Drift => (self.square[2][basic] / DRIFT_PARTS.powi(2), self.right[1][basic] / DRIFT_PARTS),
+        };
+        let own = halved.column(basic);
+        let (g, b) = ((g - own.norm_squared()).max(0.0), b - own.dot(&null.half));
+        let s2 = scale * scale;
+        let spread = 1.0 + s2 * g;
+        Fit { log_bf: -0.5 * spread.ln() + 0.5 * s2 * b * b / spread, mean: s2 * b / spread, variance: s2 / spread }
+    }
+
+    /// The same of all cosines with these prior standard deviations.
+    pub(super) fn waves(&self, sd: &[f64], halved: &DMatrix<f64>, null: &Null) -> Option<Waves> {
+        let own = halved.columns(0, COSINES);
+        let g = &self.waves - own.tr_mul(&own);
+        let b = DVector::from_column_slice(&self.right[0][..COSINES]) - own.tr_mul(&null.half);
+        let sd = DVector::from_column_slice(sd);
+        let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| f64::from(u8::from(i == j)) + sd[i] * g[(i, j)] * sd[j]);
+        let factor = Cholesky::new(scaled)?;
+        let right = sd.component_mul(&b);
+        let solved = factor.solve(&right);
+        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let (log_bf, mean) = (0.5 * right.dot(&solved) - log_det, sd.component_mul(&solved));
+        Some(Waves { log_bf, mean, sd, factor })
+    }
+}
+
+/// All cosines on some parts.
+#[derive(Debug, Clone)]
+pub(super) struct Waves {
+    /// ln BF.
+    pub(super) log_bf: f64,
+    /// Posterior means of the sizes, in the unit of the quantity.
+    pub(super) mean: DVector<f64>,
+    /// Prior standard deviations, and the factor L of I + S G* S: the covariance is S (L L')^-1 S.
+    sd: DVector<f64>,
+    factor: Cholesky<f64, Dyn>,
+}
+
+impl Waves {
+    /// Independent standard deviations of what these sizes do along columns, one size a column of them.
+    pub(super) fn directions(&self, along: &DMatrix<f64>) -> DMatrix<f64> {
+        let scaled = DMatrix::from_fn(COSINES, along.nrows(), |size, row| self.sd[size] * along[(row, size)]);
+        let half = self.factor.l_dirty().solve_lower_triangular(&scaled);
+        half.map_or_else(|| DMatrix::zeros(along.nrows(), COSINES), |half| half.transpose())
+    }
+
+    /// Root mean square along the part, and its variance.
+    pub(super) fn rms(&self) -> (f64, f64) {
+        let share = |k: usize| if k == 0 { 1.0 } else { 0.5 };
+        let weighted = DVector::from_fn(COSINES, |k, _| share(k) * self.mean[k]);
+        let rms = self.mean.dot(&weighted).sqrt();
+        let slope = weighted / rms.max(f64::MIN_POSITIVE);
+        let spread = self.directions(&DMatrix::from_row_slice(1, COSINES, slope.as_slice()));
+        (rms, spread.norm_squared())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::null::{Column, Gram, Older, Source};
+    use super::*;
+    use crate::num::stats::Resampler;
+
+    /// Causes beside the cosines.
+    const CAUSES: usize = 3;
+    /// The cause that changed before and stands in the model since then.
+    const ACCEPTED: (u32, Form) = (9, Form::Drift);
+
+    struct Stream {
+        /// Number, type, and the whitened basic columns with the residual last.
+        parts: Vec<(u32, usize, DMatrix<f64>)>,
+        columns: Vec<Column>,
+    }
+
+    /// Two types, parts that miss rows, numbers that miss parts, a change that was accepted.
+    fn stream() -> Stream {
+        let mut random = Resampler::new(7, 0);
+        let numbers = (1..=24).filter(|number: &u32| !number.is_multiple_of(7));
+        let of = |number: u32| {
+            let kind = usize::from(number.is_multiple_of(3));
+            let rows = if number.is_multiple_of(5) { 6 } else { 9 + 2 * kind };
+            (number, kind, DMatrix::from_fn(rows, COSINES + CAUSES + 1, |_, _| random.normal()))
+        };
+        let parts = numbers.map(of).collect();
+        let mut columns: Vec<Column> = Column::profile(0, 0.1).chain(Column::profile(1, 0.2)).collect();
+        columns.push(Column { source: Source::Cause(0), since: None, sd: 1.0 });
+        columns.push(Column { source: Source::Cause(1), since: Some(ACCEPTED), sd: 0.7 });
+        Stream { parts, columns }
+    }
+
+    /// ln of the normal density of all rows under covariance I + sum of s^2 x x'.
+    fn log_density(rows: &DVector<f64>, columns: &[DVector<f64>]) -> f64 {
+        let mut covariance = DMatrix::identity(rows.len(), rows.len());
+        for column in columns {
+            covariance += column * column.transpose();
+        }
+        let factor = Cholesky::new(covariance).unwrap();
+        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        -0.5 * rows.dot(&factor.solve(rows)) - log_det
+    }
+
+    impl Stream {
+        /// A basic column over all rows, weighed part by part.
+        fn dense(&self, basic: usize, weight: impl Fn(u32, usize) -> f64) -> DVector<f64> {
+            let of = |(number, kind, rows): &(u32, usize, DMatrix<f64>)| {
+                (rows.column(basic) * weight(*number, *kind)).as_slice().to_vec()
+            };
+            DVector::from_vec(self.parts.iter().flat_map(of).collect())
+        }
+    }
+
+    #[test]
+    fn running_sums_give_the_ratio_of_dense_normal_densities() {
+        let stream = stream();
+        let gram = |rows: &DMatrix<f64>| Gram { inner: rows.tr_mul(rows), rows: rows.nrows() };
+        let grams: Vec<Gram> = stream.parts.iter().map(|(.., rows)| gram(rows)).collect();
+        let told: Vec<Told<'_>> = stream
+            .parts
+            .iter()
+            .zip(&grams)
+            .enumerate()
+            .map(|(ordinal, ((number, kind, _), gram))| {
+                let free = stream.columns.iter().map(|own| (own.weight(*kind, *number), own.basic())).collect();
+                Told { number: *number, ordinal, gram, free }
+            })
+            .collect();
+        let null = Null::of(&stream.columns, &Older::none(), told.iter()).unwrap();
+        let residual = stream.dense(COSINES + CAUSES, |_, _| 1.0);
+        let free: Vec<DVector<f64>> = stream
+            .columns
+            .iter()
+            .map(|own| stream.dense(own.basic(), |number, kind| own.weight(kind, number)))
+            .collect();
+        let none = log_density(&residual, &free);
+        let sd: Vec<f64> = (0..COSINES).map(|k| 1.5 / (1.0 + k as f64)).collect();
+        let mut sums = Sums::none(null.columns.len(), COSINES + CAUSES);
+        let mut next = None;
+        for part in told.iter().rev() {
+            sums.earlier(next.map_or(0.0, |next: u32| f64::from(next - part.number)));
+            sums.begin_with(part);
+            next = Some(part.number);
+            let with = |more: &[(usize, f64)], form: Form| {
+                let acts = |scale: f64| move |number: u32, _: usize| scale * form.of(number, part.number);
+                let more = more.iter().map(|&(basic, scale)| stream.dense(basic, acts(scale)));
+                log_density(&residual, &free.iter().cloned().chain(more).collect::<Vec<_>>()) - none
+            };
+            for form in [Form::Step, Form::Drift] {
+                let halved = sums.halved(form, &null);
+                for (basic, scale) in [(COSINES + 2, 0.2), (COSINES, 1.0), (COSINES + 1, 1.0)] {
+                    let (fit, dense) = (sums.one(basic, form, scale, &halved, &null), with(&[(basic, scale)], form));
+                    // Round-off of sums over some 200 rows.
+                    assert!(
+                        (fit.log_bf - dense).abs() < 1e-9,
+                        "{form:?} since {}: {} {dense}",
+                        part.number,
+                        fit.log_bf
+                    );
+                }
+            }
+            let waves: Vec<(usize, f64)> = sd.iter().copied().enumerate().collect();
+            let log_bf = sums.waves(&sd, &sums.halved(Form::Step, &null), &null).unwrap().log_bf;
+            assert!((log_bf - with(&waves, Form::Step)).abs() < 1e-9, "since {}", part.number);
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! A process, part by part.
+
+use super::document::{Document, Part};
+use super::memory::Memory;
+use super::sight::{Eye, Sighting, used};
+use super::state::{State, Unused};
+use crate::calculator::{Calculator, Diagnosable, Failure, ForwardModel, Monitor, Watched};
+
+/// A part with fewer rows says too little.
+const LEAST_ROWS: usize = 4;
+
+/// The document of a process of `M`.
+pub type DocumentOf<M> = Document<<M as Calculator>::Input, <M as ForwardModel>::Allowances>;
+/// A part of a process of `M`.
+pub type PartOf<M> = Part<<M as ForwardModel>::Run, <M as Diagnosable>::Row>;
+
+/// A process under watch. Its state is a function of the document and of the parts taken, in the order of their numbers.
+pub struct Watch<M: Watched> {
+    pub(super) eye: Eye<M>,
+    pub(super) memory: Memory,
+    pub(super) last: Option<PartOf<M>>,
+}
+
+impl<M: Watched> Watch<M> {
+    /// Before the first part. The document has no faults.
+    pub fn new(document: DocumentOf<M>) -> Self {
+        let noise = document.noise_um.map(|um| um * M::per_diameter_um(&document.quantity));
+        let memory = Memory::new(document.options.clone(), noise);
+        Self { eye: Eye::new(document), memory, last: None }
+    }
+
+    /// All parts, in whatever order they stand: the state after each, by ascending number.
+    pub fn replay(
+        document: DocumentOf<M>,
+        parts: &[PartOf<M>],
+        monitor: &dyn Monitor,
+    ) -> Result<(Self, Vec<State>), Failure> {
+        let mut sorted: Vec<&PartOf<M>> = parts.iter().collect();
+        sorted.sort_by_key(|part| part.number);
+        let mut watch = Self::new(document);
+        let states = sorted.into_iter().map(|part| watch.take(part, monitor)).collect::<Result<_, _>>()?;
+        Ok((watch, states))
+    }
+
+    /// A part more, of a higher number than all before it and without faults.
+    pub fn take(&mut self, part: &PartOf<M>, monitor: &dyn Monitor) -> Result<State, Failure> {
+        if self.memory.parts.back().is_some_and(|(last, _)| last.number >= part.number) {
+            return Err(Failure::Internal("a part that comes before the last one".to_owned()));
+        }
+        let ordinal = self.memory.came;
+        self.memory.came += 1;
+        if used(part).len() < LEAST_ROWS {
+            return Ok(self.memory.unused(part.number, Unused::TooFewRows));
+        }
+        let signs = self.eye.signs(part, &mut self.memory.catalogue, monitor)?;
+        let (kind, value) = (self.eye.kind(part)?, self.eye.values(part));
+        let residual = value.iter().zip(&signs.base).zip(&signs.predicted);
+        let residual = residual.map(|((y, f), predicted)| if *predicted { y - f } else { 0.0 }).collect();
+        let (keep, checks, number) = (signs.predicted.clone(), part.gauge_checks.clone(), part.number);
+        let sighting = Sighting { number, ordinal, kind, signs, value, residual, keep, checks, odd: false };
+        self.last = Some(part.clone());
+        self.memory.take(sighting, monitor)
+    }
+
+    /// How many parts and how many onsets are in memory, and how many columns are free: bounded, however many parts came.
+    pub fn size(&self) -> [usize; 3] {
+        let onsets = self.memory.with_told(|memory, told| {
+            let mut onsets: Vec<u32> = memory.entries(told, 0).iter().map(|entry| entry.since).collect();
+            onsets.dedup();
+            onsets.len()
+        });
+        [self.memory.parts.len(), onsets.unwrap_or(0), self.memory.columns.len()]
+    }
+}
