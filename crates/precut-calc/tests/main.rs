@@ -83,6 +83,7 @@ mod machinability_library;
 mod machinability_real;
 mod material_library;
 mod path_chords;
+mod program_correction;
 mod program_reading;
 mod program_stock;
 mod program_yielding;
