@@ -255,7 +255,7 @@ fn place_of(part: &str, whole: &[u8]) -> Range<usize> {
     start..start + part.len()
 }
 
-fn named(path: &Path, error: &io::Error) -> String {
+pub(super) fn named(path: &Path, error: &io::Error) -> String {
     if path.as_os_str() == "-" { format!("standard input: {error}") } else { format!("{}: {error}", path.display()) }
 }
 

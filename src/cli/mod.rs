@@ -1,6 +1,7 @@
 //! The command line: the service, and the same calculators without it.
 
 mod backup;
+mod compensate;
 mod health;
 mod job;
 mod library;
@@ -40,6 +41,8 @@ Examples:
   precut solve job.json --library ours.toml       with machines and tools of one's own
   precut process replay parts.json                what would have been said after each measured part
   precut check job.json                           every fault of a job at once
+  precut compensate shaft.nc --job shaft.json -o shaft.c.nc
+                                                  a program corrected, the diff on standard output
   precut solve job.json --lang ru                 the same in Russian
   precut example studies | precut solve - --format csv
   PRECUT_LOG_FORMAT=json precut                   settings from the environment
@@ -77,6 +80,11 @@ enum Command {
     Solve(SolveArgs),
     /// Check a job file without computing: prints the job with every default filled in
     Check(JobArgs),
+    /// Correct a turning program: X of its finishing cuts shifted, every other line as it was
+    #[command(
+        after_help = "Exit codes: 0 lines changed, 3 nothing to change, 2 program or job not read, 1 no correction."
+    )]
+    Compensate(compensate::CompensateArgs),
     /// List the calculators with their questions
     List,
     /// List the machines that a job may name, or show one
@@ -249,7 +257,8 @@ pub fn main_as(
         .map_err(|error| Failed::Machine(error.to_string()))
         .and_then(|registry| run(cli, &registry, isolation));
     match outcome {
-        Ok(()) | Err(Failed::NobodyListens) => ExitCode::SUCCESS,
+        Ok(code) => code,
+        Err(Failed::NobodyListens) => ExitCode::SUCCESS,
         Err(Failed::Usage(message)) => {
             let _ = writeln!(io::stderr(), "precut: {message}");
             ExitCode::from(2)
@@ -277,9 +286,10 @@ fn exit_code(problem: &Problem) -> u8 {
     }
 }
 
-fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<(), Failed> {
+fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<ExitCode, Failed> {
     let language = cli.lang.unwrap_or_default();
-    match cli.command {
+    let done = match cli.command {
+        Some(Command::Compensate(arguments)) => return compensate::run(&arguments, registry, language),
         None => serve::run(&cli.serve, registry.clone(), isolation),
         Some(Command::Serve(serve)) => serve::run(&serve, registry.clone(), isolation),
         Some(Command::Solve(solve)) => job::solve(&solve, registry, language),
@@ -305,7 +315,8 @@ fn run(cli: Cli, registry: &Registry, isolation: Option<Isolation>) -> Result<()
         Some(Command::Verify(copy)) => backup::check(&copy),
         Some(Command::Health { url }) => health::ask(url),
         Some(Command::HashKey) => hash_key(),
-    }
+    };
+    done.map(|()| ExitCode::SUCCESS)
 }
 
 fn list(registry: &Registry, language: Language) -> Result<(), Failed> {

@@ -417,3 +417,45 @@ fn names_are_looked_up_in_files_and_data_folders() {
     assert_eq!(codes["geometry"]["cutting_edge_angle_deg"], 95.0);
     assert_eq!(precut(&["tools", "no such tool"]).status.code(), Some(2));
 }
+
+#[test]
+fn a_program_is_corrected_beside_its_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let example = precut(&["example", "program-compensation", "slender_shaft"]);
+    let mut job: Value = serde_json::from_str(&said(&example)).unwrap();
+    let text = job["job"].as_object_mut().unwrap().remove("nc_program").unwrap();
+    // Latin-1 and ends of lines of Windows.
+    let given: Vec<u8> =
+        text.as_str().unwrap().replace('\n', "\r\n").chars().map(|c| c as u8).chain(*b"(K\xF6rper)\r\n").collect();
+    std::fs::write(path("shaft.nc"), &given).unwrap();
+    std::fs::write(path("shaft.json"), job.to_string()).unwrap();
+    let (program, job, out) = (path("shaft.nc"), path("shaft.json"), path("shaft.c.nc"));
+
+    let output = precut(&["compensate", &program, "--job", &job, "-o", &out]);
+    let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{complaints}");
+    let diff = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(diff.contains(&format!("--- {program}\n+++ {out}\n@@ ")), "{diff}");
+    let returned = std::fs::read(&out).unwrap();
+    let lines = |bytes: &[u8]| bytes.split(|&byte| byte == b'\n').map(<[u8]>::to_vec).collect::<Vec<_>>();
+    let (old, new) = (lines(&given), lines(&returned));
+    assert!(new.iter().filter(|line| !line.is_empty()).all(|line| line.ends_with(b"\r")));
+    let gone = old.iter().filter(|line| !new.contains(line)).count();
+    assert!((1..8).contains(&gone), "{gone} lines changed: {diff}");
+    assert!(new.contains(&b"(K\xF6rper)\r".to_vec()));
+
+    // Nothing is written without being asked, the given program never over itself.
+    std::fs::remove_file(&out).unwrap();
+    assert_eq!(precut(&["compensate", &program, "--job", &job, "--check"]).status.code(), Some(0));
+    assert_eq!(precut(&["compensate", &program, "--job", &job, "-o", &program]).status.code(), Some(2));
+    assert_eq!(std::fs::read(&program).unwrap(), given);
+    assert_eq!(precut(&["compensate", &program, "--job", &job, "--in-place"]).status.code(), Some(0));
+    assert_eq!(std::fs::read(&program).unwrap(), returned);
+
+    std::fs::write(&program, b"G21 G18 G99\nG0 X40. Z2.\n#1=2.\nM30\n").unwrap();
+    let refused = precut(&["compensate", &program, "--job", &job, "--check"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let complaints = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(complaints.contains(&format!("{program}:3:1: ")), "{complaints}");
+}

@@ -86,6 +86,7 @@ mod path_chords;
 mod process_streams;
 mod process_support;
 mod process_watch;
+mod program_correction;
 mod program_reading;
 mod program_stock;
 mod program_yielding;

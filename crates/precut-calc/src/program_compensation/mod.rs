@@ -1,26 +1,32 @@
 //! The program that a shop has already (`program`): read as its control reads it.
 //!
 //! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves; the blank, rigid and yielding) -> `answer` (moves,
-//! errors, pictures, what is said).
+//! errors, the corrected program, pictures, what is said).
 
 mod answer;
 mod job;
 mod model;
 
-pub use answer::output::{CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, Outcome, ReadMoves, YieldedWork};
+pub use answer::output::{
+    CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
+    Outcome, ReadMoves, Transition, YieldedWork,
+};
 pub use job::{
     DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
     ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
 };
+pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
 
+use std::collections::BTreeSet;
+
 use crate::calculator::{
-    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
-    Table,
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
+    Monitor, Table,
 };
 
 use answer::{advice, output, picture};
-use model::{reader, stock, yielding};
+use model::{correction, reader, stock, yielding};
 
 /// Reads programs for lathes.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 2,
+        version: 3,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -42,7 +48,8 @@ impl Calculator for ProgramCompensation {
                   understood is refused with its line, column and word and with what to do, all of it at once; threads and \
                   grooves are passed with a warning. Nothing is guessed. With a blank: the surface that the program leaves on \
                   work and machine that do not yield, which line makes which part of it, and rapid moves through stock. With forces \
-                  and supports: what it leaves where they yield.",
+                  and supports: what it leaves where they yield, and in mode `compensate` the same program with X of its finishing cuts \
+                  shifted against that, every other line as it was, proved by reading and driving it again.",
         references: &[
             "Fanuc, Operator's manual for lathe systems, G-code systems A, B and C",
             "Siemens, SINUMERIK 840D sl Programming manual, Fundamentals",
@@ -79,8 +86,10 @@ impl Calculator for ProgramCompensation {
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
         // Where the work yields, every move bends a beam of as many sections as the outline has parts by then.
         let yielding_ms = if job.force.is_some() { 0.12 * lines as f64 + 4e-4 * (lines as f64).powi(2) } else { 0.0 };
+        // A correction drives it again as it should come out, and what comes of it once or a few times.
+        let drives = if job.mode.kind == ModeKind::Compensate { 4.0 } else { 1.0 };
         Cost {
-            ms: read_ms + turned_ms + yielding_ms,
+            ms: read_ms + drives * (turned_ms + yielding_ms),
             // A line makes four moves at most; cycles over a contour make some more.
             bytes: 10_000_000 + 1500 * lines as u64 + 2 * bytes as u64,
             driver: "/nc_program",
@@ -88,7 +97,6 @@ impl Calculator for ProgramCompensation {
     }
 
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
-        let ModeKind::Read = job.mode.kind;
         monitor.progress(0.0, Message::new("stage_reading"));
         let program = reader::read(&job.nc_program, job.dialect, &job.reading, monitor)?;
         let mut warnings = program.warnings.clone();
@@ -109,7 +117,12 @@ impl Calculator for ProgramCompensation {
         let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
         warnings.extend(yielded.as_ref().and_then(advice::turned_law));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
-        let output = output::outcome(&program, turned.as_ref(), yielded.as_ref());
+        let corrected = corrected(&program, job, turned.as_ref().zip(yielded.as_ref()), monitor)?;
+        warnings.extend(corrected.iter().flat_map(advice::of_corrected));
+        if job.mode.kind == ModeKind::Compensate && corrected.is_none() {
+            warnings.push(Finding::new("program_unsafe", "/nc_program"));
+        }
+        let output = output::outcome(&program, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
@@ -135,7 +148,31 @@ fn yielded(
     let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
     monitor.progress(0.5, Message::new("stage_yielding"));
     let finishing = stock::lines_that_finish(turned);
-    yielding::yielding(program, job, &holding, blank, &finishing, monitor).map(Some)
+    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), given: None };
+    yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
+}
+
+/// The program that leaves no error, where it is asked for.
+fn corrected(
+    program: &reader::Program,
+    job: &Job,
+    driven: Option<(&stock::Turned, &yielding::Yielded)>,
+    monitor: &dyn Monitor,
+) -> Result<Option<correction::Corrected>, Failure> {
+    let blank = job.stock.as_ref().zip(job.program_zero_z_mm);
+    match (job.mode.kind, job.holding(), blank, driven) {
+        // A program that does harm as it is gets no new one.
+        (ModeKind::Compensate, Some(holding), Some(blank), Some(driven)) if is_safe(driven.0, blank.0) => {
+            monitor.progress(0.7, Message::new("stage_correcting"));
+            correction::corrected(program, job, &holding, blank, driven, monitor).map(Some)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Whether nothing speaks against a program on its blank.
+fn is_safe(turned: &stock::Turned, stock: &ProgramStock) -> bool {
+    turned.in_stock.is_empty() && stock::doubt(turned, stock).is_none()
 }
 
 /// The equations that act.
@@ -143,6 +180,9 @@ fn basis(job: &Job) -> Vec<Basis> {
     let mut used = vec![Basis { equation: "program/2", source: "manuals of the controls" }];
     if job.stock.is_some() {
         used.push(Basis { equation: "program/3", source: "envelope of segments and arcs" });
+    }
+    if job.mode.kind == ModeKind::Compensate {
+        used.push(Basis { equation: "program/5", source: "opening at the depth that is meant" });
     }
     if let Some(force) = &job.force {
         used.push(Basis { equation: "program/4", source: "cut along any direction, equilibrium at the engaged depth" });
@@ -165,14 +205,14 @@ const CODES: Codes = Codes {
         crate::deflection_compensation::EFFECT_CODES,
         crate::force::FAULT_CODES,
     ],
-    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES, yielding::FAILURE_CODES],
+    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES, yielding::FAILURE_CODES, correction::FAILURE_CODES],
     warnings: &[
         reader::WARNING_CODES,
         advice::WARNING_CODES,
         &["unconfirmed_force_coefficient", "edge_angle_beyond_table"],
     ],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_reading", "stage_turning", "stage_yielding", "stage_done"]],
+    stages: &[&["stage_reading", "stage_turning", "stage_yielding", "stage_correcting", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };
 

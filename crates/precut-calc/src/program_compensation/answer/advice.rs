@@ -3,9 +3,10 @@
 use crate::calculator::{Finding, Message};
 
 use super::super::job::ProgramStock;
+use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::stock::{Doubt, Turned, implausible_mm};
 use super::super::model::yielding::Yielded;
-use super::output::Outcome;
+use super::output::{CompensatedProgram, Outcome};
 
 /// Rapid moves that are told.
 const MOST_RAPIDS: usize = 100;
@@ -13,11 +14,27 @@ const MOST_RAPIDS: usize = 100;
 const MOST_LINES: usize = 20;
 
 /// What may be wrong with a program on its blank.
-pub(crate) const WARNING_CODES: &[&str] = &["rapid_in_stock", "nothing_cut", "cut_implausible", "force_law_turned"];
+pub(crate) const WARNING_CODES: &[&str] = &[
+    "rapid_in_stock",
+    "nothing_cut",
+    "cut_implausible",
+    "force_law_turned",
+    "program_unsafe",
+    "undersize_before",
+    "left_alone",
+];
 
 /// What an answer may explain.
-pub(crate) const EXPLANATION_CODES: &[&str] =
-    &["program_read", "cycles_expanded", "stretches_passed", "surface_left", "error_along_contour"];
+pub(crate) const EXPLANATION_CODES: &[&str] = &[
+    "program_read",
+    "cycles_expanded",
+    "stretches_passed",
+    "surface_left",
+    "error_along_contour",
+    "program_corrected",
+    "jumps_left_thick",
+    "nothing_to_correct",
+];
 
 pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     let mut said = vec![
@@ -44,7 +61,41 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
             Message::new("error_along_contour").with("smallest_error_um", smallest).with("largest_error_um", largest),
         );
     }
+    if let Some(compensation) = &outcome.compensation {
+        said.extend(of_compensation(outcome.lines, compensation));
+    }
     said
+}
+
+fn of_compensation(lines: usize, compensation: &CompensatedProgram) -> Vec<Message> {
+    let Some(proof) = &compensation.proof else { return vec![Message::new("nothing_to_correct")] };
+    let largest = |low: f64, high: f64| high.max(-low);
+    let corrected = Message::new("program_corrected")
+        .with("changed", compensation.lines_changed.len())
+        .with("lines", lines)
+        .with("before_um", largest(proof.smallest_error_before_um, proof.largest_error_before_um))
+        .with("after_um", largest(proof.smallest_error_after_um, proof.largest_error_after_um));
+    let thickest = compensation.transitions.iter().map(|one| one.leaves_um).reduce(f64::max);
+    let thick = thickest.map(|leaves_um| {
+        Message::new("jumps_left_thick").with("stretches", compensation.transitions.len()).with("leaves_um", leaves_um)
+    });
+    [Some(corrected), thick].into_iter().flatten().collect()
+}
+
+/// What is to be known of a corrected program: surfaces that come out too small, and lines that stay though they finish.
+pub(crate) fn of_corrected(corrected: &Corrected) -> Vec<Finding> {
+    let undersize = corrected.undersize.iter().take(MOST_LINES).map(|one| {
+        Finding::new("undersize_before", "/nc_program")
+            .measured(-one.error_um, 0.0, "um")
+            .with("line", one.line)
+            .with("z_mm", one.z_mm)
+    });
+    // That faces keep their place, and what is less than a step, needs no warning.
+    let is_told = |left: &&LeftAlone| !matches!(left.why, WhyLeftAlone::Face | WhyLeftAlone::BelowResolution);
+    let lines: Vec<usize> =
+        corrected.left_alone.iter().filter(is_told).map(|left| left.line).take(MOST_LINES).collect();
+    let left = (!lines.is_empty()).then(|| Finding::new("left_alone", "/nc_program").with("lines", lines));
+    undersize.chain(left).collect()
 }
 
 /// Lines that cut in another direction than the force law was measured in.

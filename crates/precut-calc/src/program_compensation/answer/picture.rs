@@ -6,10 +6,10 @@ use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role,
 
 use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
-use super::output::{LeftSurface, Outcome, Path, YieldedWork};
+use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, YieldedWork};
 
 pub(crate) const FIGURE_IDS: &[&str] = &["surface", "program", "errors"];
-pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts"];
+pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes"];
 
 /// Codes of titles, axes and legends.
 pub(crate) const LABEL_CODES: &[&str] = &[
@@ -27,6 +27,7 @@ pub(crate) const LABEL_CODES: &[&str] = &[
     "error_along",
     "error_of_diameter",
     "error_as_programmed",
+    "error_as_corrected",
 ];
 
 /// Chords of a quarter in the picture.
@@ -63,14 +64,30 @@ pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         figures.push(one("program", "program_moves", "program_z", "program_diameter", items));
     }
     if let Some(yielding) = outcome.yielding.as_ref().filter(|yielding| yielding.contour.z_mm.len() > 1) {
-        figures.push(errors(yielding));
+        figures.push(errors(yielding, outcome.compensation.as_ref().map(|compensation| &compensation.contour)));
     }
     figures
 }
 
-/// The error along the contour, with gaps where another line goes on.
-fn errors(yielding: &YieldedWork) -> Figure {
-    let along = &yielding.contour;
+/// The error along the contour, as it is and as the corrected program leaves it.
+fn errors(yielding: &YieldedWork, corrected: Option<&ErrorAlong>) -> Figure {
+    let mut items = vec![error_along("error_as_programmed", &yielding.contour, Role::Before)];
+    items.extend(
+        corrected
+            .filter(|corrected| !corrected.z_mm.is_empty())
+            .map(|corrected| error_along("error_as_corrected", corrected, Role::After)),
+    );
+    Figure {
+        id: "errors",
+        title: Message::new("error_along"),
+        frame: Frame::Stacked,
+        x: Axis::linear("surface_z", "mm"),
+        panels: vec![Panel { y: Axis::linear("error_of_diameter", "um"), height: 1.0, items }],
+    }
+}
+
+/// An error with gaps where another line goes on.
+fn error_along(name: &'static str, along: &ErrorAlong, role: Role) -> Item {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     for (i, (&z, &error)) in along.z_mm.iter().zip(&along.diameter_error_um).enumerate() {
         if i > 0 && along.line[i - 1] != along.line[i] {
@@ -80,14 +97,7 @@ fn errors(yielding: &YieldedWork) -> Figure {
         x.push(z);
         y.push(Some(error));
     }
-    let items = vec![Item::Line { name: "error_as_programmed", x, y, role: Role::Before }];
-    Figure {
-        id: "errors",
-        title: Message::new("error_along"),
-        frame: Frame::Stacked,
-        x: Axis::linear("surface_z", "mm"),
-        panels: vec![Panel { y: Axis::linear("error_of_diameter", "um"), height: 1.0, items }],
-    }
+    Item::Line { name, x, y, role }
 }
 
 /// The blank and what is left of it.
@@ -235,7 +245,34 @@ pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
     if let Some(yielding) = &outcome.yielding {
         found.extend(tables_of_yielding(yielding));
     }
+    if let Some(compensation) = outcome.compensation.as_ref().filter(|one| !one.changes.is_empty()) {
+        found.push(changes(compensation));
+    }
     found
+}
+
+/// A row for every line that is given back in the place of one that changed.
+fn changes(compensation: &CompensatedProgram) -> Table {
+    let rows = || {
+        compensation.changes.iter().flat_map(|change| {
+            change
+                .new
+                .iter()
+                .enumerate()
+                .map(move |(i, new)| (change, if i == 0 { change.old.as_str() } else { "" }, new))
+        })
+    };
+    let of = |number: fn(&LineChange) -> f64| -> Vec<f64> { rows().map(|(change, ..)| number(change)).collect() };
+    Table {
+        id: "changes",
+        columns: vec![
+            Column::numbers("line", "1", &of(|change| change.line as f64)),
+            Column::words("old", rows().map(|(_, old, _)| old.to_owned().into()).collect()),
+            Column::words("new", rows().map(|(.., new)| new.clone().into()).collect()),
+            Column::numbers("smallest_shift", "um", &of(|change| change.smallest_shift_um)),
+            Column::numbers("largest_shift", "um", &of(|change| change.largest_shift_um)),
+        ],
+    }
 }
 
 fn tables_of_yielding(yielding: &YieldedWork) -> [Table; 2] {

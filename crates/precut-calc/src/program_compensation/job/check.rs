@@ -3,7 +3,7 @@
 use crate::calculator::{Check, Finding, Violations};
 use crate::material;
 
-use super::input::Job;
+use super::input::{Job, ModeKind};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &[
@@ -14,6 +14,7 @@ pub(crate) const CODES: &[&str] = &[
     "duplicate_tool",
     "tip_not_outside",
     "force_without_stock",
+    "compensation_without_force",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -56,7 +57,9 @@ impl Job {
             });
         }
         if self.force.is_none() {
-            return;
+            return violations.require(self.mode.kind != ModeKind::Compensate, || {
+                Finding::new("compensation_without_force", "/force")
+            });
         }
         let Some(stock) = &self.stock else {
             return violations.add(Finding::new("force_without_stock", "/stock"));

@@ -347,13 +347,33 @@ pub enum ProgramFeed {
 }
 
 /// What is asked of a program.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = ProgramMode)]
 pub struct Mode {
     /// What is done with it.
     #[schema(example = "read")]
     pub kind: ModeKind,
+    /// How far the corrected path may come off the exact one, on the radius.
+    #[serde(default = "half")]
+    #[schema(minimum = 0.05, maximum = 100.0, default = 0.5, example = 0.5, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("e_c")), ("x-advanced" = json!(true))))]
+    pub chord_tolerance_um: f64,
+    /// Least step of X that the control takes, as X is written; of a program in inches it is 0.0001 inch.
+    #[serde(default = "one")]
+    #[schema(minimum = 0.01, maximum = 100.0, default = 1.0, example = 1.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("i_X")), ("x-advanced" = json!(true))))]
+    pub increment_um: f64,
+    /// Least length of a block.
+    #[serde(default = "tenth")]
+    #[schema(minimum = 0.01, maximum = 10.0, default = 0.1, example = 0.1, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l_b")), ("x-advanced" = json!(true))))]
+    pub min_block_length_mm: f64,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+fn tenth() -> f64 {
+    0.1
 }
 
 /// What is done with a program.
@@ -363,4 +383,6 @@ pub struct Mode {
 pub enum ModeKind {
     /// It is read: its moves and what is wrong with it.
     Read,
+    /// X of its finishing cuts is shifted so that the error is gone; nothing else changes.
+    Compensate,
 }

@@ -409,7 +409,7 @@ impl<'a> Reader<'a> {
         self.state.feed = Some(if self.state.per_minute { Feed::PerMinute(feed) } else { Feed::PerRev(feed) });
     }
 
-    fn is_fanuc(&self) -> bool {
+    pub(super) fn is_fanuc(&self) -> bool {
         matches!(self.dialect, Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC)
     }
 
@@ -660,6 +660,7 @@ impl<'a> Reader<'a> {
     fn path_to(&mut self, words: &mut Words<'_, 'a>, asked: &Asked<'a>, path: Path, spot: Spot<'a>) {
         let line = words.block.line;
         let end = self.target(words);
+        let before = self.moves.len();
         match path {
             Path::Rapid => self.go(line, Kind::Rapid, end, None),
             Path::Line => {
@@ -676,6 +677,9 @@ impl<'a> Reader<'a> {
                     self.go(line, kind, end, Some([2.0 * centre[0], centre[1]]));
                 }
             }
+        }
+        if self.moves.len() > before {
+            self.keep_words(words);
         }
         if end.known().is_some() {
             // A later fault is one of its own.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::super::super::job::Dialect;
 
 /// Lines without their ends: LF, CR LF and CR end one, in any mixture.
-pub(super) fn lines(text: &str) -> Vec<Range<usize>> {
+pub(crate) fn lines(text: &str) -> Vec<Range<usize>> {
     let bytes = text.as_bytes();
     let mut found = Vec::new();
     let mut start = 0;

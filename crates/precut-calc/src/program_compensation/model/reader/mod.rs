@@ -15,7 +15,9 @@ mod lexer;
 mod lines;
 mod moves;
 mod state;
+mod words_of_line;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::calculator::{Failure, Finding, Monitor, checkpoint};
@@ -27,8 +29,10 @@ use lines::Extent;
 use moves::{Move, Place};
 use state::State;
 
+pub(crate) use lines::lines as lines_of_text;
 pub use moves::{ContourCycle, CycleKind, Kind, Nose};
 pub(crate) use moves::{Feed, Move as ProgramMove, Speed};
+pub(crate) use words_of_line::{NumberInText, WordsOfLine};
 
 /// Most lines of a program.
 pub const MAX_LINES: usize = 200_000;
@@ -110,6 +114,8 @@ pub(crate) struct Program {
     pub(crate) tools: Vec<String>,
     /// The cycles that were expanded.
     pub(crate) cycles: Vec<ContourCycle>,
+    /// The words of the lines that make one move along a path; none of a line that makes several.
+    pub(crate) words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
     /// What is to be said of it.
     pub(crate) warnings: Vec<Finding>,
 }
@@ -147,6 +153,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         moves: Vec::new(),
         tools: Vec::new(),
         cycles: Vec::new(),
+        words_of_lines: BTreeMap::new(),
         numbers: None,
         contour: None,
         contours: Vec::new(),
@@ -157,7 +164,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         unknown_functions: Vec::new(),
     };
     reader.run(monitor)?;
-    let Reader { mut notes, moves, tools, cycles, .. } = reader;
+    let Reader { mut notes, moves, tools, cycles, words_of_lines, .. } = reader;
     if notes.count() == 0 && moves.is_empty() {
         notes.fault(Spot { line: 1, column: 1, word: "" }, "nothing_in_program");
     }
@@ -165,7 +172,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         return Err(refused_with(notes, hints::other_dialect(text, &lines, dialect)));
     }
     let (_, _, warnings) = notes.into_parts();
-    Ok(Program { lines: lines.len(), moves, tools, cycles, warnings })
+    Ok(Program { lines: lines.len(), moves, tools, cycles, words_of_lines, warnings })
 }
 
 fn refused(notes: Notes) -> Failure {
@@ -191,6 +198,7 @@ struct Reader<'a> {
     moves: Vec<Move>,
     tools: Vec<String>,
     cycles: Vec<ContourCycle>,
+    words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
     /// Lines by the numbers of their blocks, once they are asked for.
     numbers: Option<Vec<(u64, usize)>>,
     /// What is done with the contour whose lines are run.

@@ -41,6 +41,9 @@ pub(crate) struct CutPlace {
     pub(crate) radial_force_n: f64,
     /// By how much the tool comes to stand off its path, mm.
     pub(crate) lift_mm: f64,
+    /// Beside corrected moves, at the ends of a move and where it cuts nothing: how far the tool may be set in there without
+    /// touching what is left, mm.
+    pub(crate) clear_mm: f64,
 }
 
 /// Feed and speed of a move, as far as the program says them.
@@ -82,6 +85,8 @@ pub(crate) struct Cutting<'a> {
     pub(crate) real: &'a Chain,
     /// Whether the move goes on where the last one stopped cutting.
     pub(crate) goes_on: bool,
+    /// Whether the surface comes out as it is meant: then the depth is that at the nominal place.
+    pub(crate) is_corrected: bool,
 }
 
 /// Forces at a place, for any depth.
@@ -187,6 +192,7 @@ impl Cutting<'_> {
             compliance_mm_per_n,
             radial_force_n: 0.0,
             lift_mm: lift_mm(radius_mm, gaps.opening(place, Push::default())),
+            clear_mm: 0.0,
         };
         let pace = Pace { feed: self.stroke.one.feed, speed: self.stroke.one.speed };
         let (Some(outline), Some(feed_mm_per_rev)) = (self.outline(share), pace.feed_mm_per_rev(radius_mm)) else {
@@ -208,7 +214,7 @@ impl Cutting<'_> {
             let push = loaded.push(engaged);
             (lift_mm(radius_mm, gaps.opening(place, push)), engaged.depth_mm, push.radial_n)
         };
-        let (lift_mm, depth_mm, radial_force_n) = equilibrium(at);
+        let (lift_mm, depth_mm, radial_force_n) = if self.is_corrected { at(0.0) } else { equilibrium(at) };
         CutPlace { nominal_depth_mm, depth_mm, lead_rad: outline.lead, radial_force_n, lift_mm, ..still }
     }
 }

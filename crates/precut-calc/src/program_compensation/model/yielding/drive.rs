@@ -1,14 +1,14 @@
 //! A program driven over a blank that yields: every move on what the moves before have really left.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::calculator::{self, Failure, Finding, Monitor};
 use crate::deflection_compensation::{FeedDirection, Holding, ToolPlace};
 use crate::force::ForceModel;
 
 use super::super::super::job::{Job, ProgramStock};
-use super::super::reader::Program;
-use super::super::stock::{Chain, Part, Stroke, Way, blank, strokes};
+use super::super::reader::{Kind, Program};
+use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
 use super::sections::slices;
 
@@ -25,6 +25,8 @@ const APART_RAD: f64 = std::f64::consts::PI / 180.0;
 const NEAREST_MM: f64 = 0.01;
 /// A chip thinner than this is none, mm.
 const CHIP_MM: f64 = 1e-7;
+/// A rapid move that stays farther off is told nothing of, mm.
+const NEAR_MM: f64 = 1.0;
 /// Most places at the beginning, and in all.
 const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
@@ -38,9 +40,22 @@ const TURNED_RAD: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// A place of a move that cuts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlaceOfMove {
-    /// Line of the move.
+    /// Line of the move, and which of the program's moves it is.
     pub(crate) line: usize,
+    pub(crate) mv: usize,
     pub(crate) place: CutPlace,
+}
+
+/// How moves are driven.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Driven<'a> {
+    /// Lines that make the contour: they are followed more closely.
+    pub(crate) finishing: &'a [usize],
+    /// Moves that come out as they are meant: at their places stands what the tool has to be set in for that.
+    pub(crate) corrected: &'a BTreeSet<usize>,
+    /// Of a corrected program the one that was given, and of which of its moves every move is a piece: the work bends as
+    /// the part that it means.
+    pub(crate) given: Option<(&'a Program, &'a [usize])>,
 }
 
 /// What a program leaves where work and machine yield.
@@ -48,11 +63,54 @@ pub(crate) struct PlaceOfMove {
 pub(crate) struct Yielded {
     /// Places of the moves that cut, in the order of the program.
     pub(crate) places: Vec<PlaceOfMove>,
+    /// The rapid moves that come near to what is left there, in the order of the program.
+    pub(crate) rapids: Vec<Clearance>,
     /// What is left, and what would be, did nothing yield.
     pub(crate) real: Vec<Part>,
     pub(crate) nominal: Vec<Part>,
     /// Lines that cut in another direction than the force law was measured in.
     pub(crate) turned_lines: BTreeSet<usize>,
+}
+
+/// How far a rapid move stays off the work, across the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Clearance {
+    pub(crate) line: usize,
+    pub(crate) mv: usize,
+    /// Below 0 it goes through it, mm.
+    pub(crate) clearance_mm: f64,
+}
+
+/// The work as the section of the beam has it: before and after a move of the program that is meant.
+struct Meant {
+    /// Of a corrected program the moves of the given one.
+    given: Option<BTreeMap<usize, (Shape, Way)>>,
+    at: Option<usize>,
+    before: Chain,
+    after: Chain,
+}
+
+impl Meant {
+    fn of(driven: Driven<'_>, job: &Job, (stock, zero): (&ProgramStock, f64)) -> Self {
+        let given = driven.given.map(|(program, _)| {
+            let feeds = strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed());
+            feeds.map(|stroke| (stroke.index, (stroke.shape, stroke.way))).collect()
+        });
+        Self { given, at: None, before: blank(stock), after: blank(stock) }
+    }
+
+    /// Comes to a move, be it the next one or a further piece of the last.
+    fn come_to(&mut self, stroke: &Stroke<'_>, driven: Driven<'_>) {
+        let mv = driven.given.and_then(|(_, of)| of.get(stroke.index).copied()).unwrap_or(stroke.index);
+        if self.at == Some(mv) {
+            return;
+        }
+        self.at = Some(mv);
+        self.before.clone_from(&self.after);
+        let own = (stroke.shape, stroke.way);
+        let (shape, way) = self.given.as_ref().and_then(|given| given.get(&mv)).copied().unwrap_or(own);
+        self.after.turn(&shape, &way, stroke.one.line);
+    }
 }
 
 /// Path and time in the cut so far.
@@ -68,21 +126,34 @@ pub(crate) fn yielding(
     job: &Job,
     holding: &Holding,
     (stock, zero): (&ProgramStock, f64),
-    finishing: &[usize],
+    driven: Driven<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Yielded, Failure> {
-    let mut nominal = blank(stock);
+    let mut meant = Meant::of(driven, job, (stock, zero));
     let mut real = blank(stock);
-    let mut yielded =
-        Yielded { places: Vec::new(), real: Vec::new(), nominal: Vec::new(), turned_lines: BTreeSet::new() };
+    let mut yielded = Yielded {
+        places: Vec::new(),
+        rapids: Vec::new(),
+        real: Vec::new(),
+        nominal: Vec::new(),
+        turned_lines: BTreeSet::new(),
+    };
     let mut so_far = SoFar::default();
     // The last move that was still cutting when it ended.
     let mut last_cut: Option<usize> = None;
     let mut pace = calculator::Pace::new(monitor);
-    for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
+    for stroke in strokes(program, job, zero) {
         let Stroke { one, shape, way, .. } = &stroke;
-        let before = nominal.clone();
-        nominal.turn(shape, way, one.line);
+        if one.kind == Kind::Rapid {
+            let clearance_mm = -real.depth_of(shape, way);
+            if clearance_mm < NEAR_MM {
+                yielded.rapids.push(Clearance { line: one.line, mv: stroke.index, clearance_mm });
+            }
+        }
+        if !one.kind.is_feed() {
+            continue;
+        }
+        meant.come_to(&stroke, driven);
         if real.depth_of(shape, way) <= CHIP_MM {
             continue;
         }
@@ -95,39 +166,52 @@ pub(crate) fn yielding(
             return Err(refused("speed_missing", one.line));
         }
         let bore_mm = stock.bore_diameter_mm;
-        let held = holding.hold(&slices(&before, &nominal, bore_mm), &acts, direction(way))?;
+        let held = holding.hold(&slices(&meant.before, &meant.after, bore_mm), &acts, direction(way))?;
         let cutting = Cutting {
             stroke: &stroke,
             held: &held,
             force: &holding.force,
             with_main: holding.tangential,
-            nominal: &before,
+            nominal: &meant.before,
             real: &real,
             goes_on: last_cut == stroke.index.checked_sub(1),
+            is_corrected: driven.corrected.contains(&stroke.index),
         };
-        let straight_mm = STRAIGHT_MM[usize::from(!finishing.contains(&one.line))];
+        let is_corrected = cutting.is_corrected;
+        let straight_mm = STRAIGHT_MM[usize::from(!driven.finishing.contains(&one.line))];
         let from = cutting.meets_from();
         let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
-        let places = along.places()?;
+        let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
-        let lifted: Vec<Way> = places
-            .windows(2)
-            .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
-            .collect();
-        for way in &lifted {
+        if is_corrected {
             real.turn(shape, way, one.line);
+        } else {
+            let lifted: Vec<Way> = places
+                .windows(2)
+                .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
+                .collect();
+            for way in &lifted {
+                real.turn(shape, way, one.line);
+            }
+        }
+        if !driven.corrected.is_empty() {
+            let is_end = |place: &CutPlace| place.share <= 0.0 || place.share >= 1.0;
+            for place in places.iter_mut().filter(|place| place.depth_mm <= 0.0 || is_end(place)) {
+                let at = [place.z_mm, place.radius_mm];
+                place.clear_mm = -real.depth_of(shape, &Way::Line(at, at));
+            }
         }
         so_far = after(so_far, way, move_pace);
         let is_turned = places.iter().any(|place| place.depth_mm > 0.0) && climbs(way);
         if is_turned && !matches!(holding.force, ForceModel::Kienzle(_)) {
             yielded.turned_lines.insert(one.line);
         }
-        let line = one.line;
-        last_cut = places.last().filter(|place| place.depth_mm > 0.0).map(|_| stroke.index);
-        yielded.places.extend(places.into_iter().map(|place| PlaceOfMove { line, place }));
+        let (line, mv) = (one.line, stroke.index);
+        last_cut = places.last().filter(|place| place.depth_mm > 0.0).map(|_| mv);
+        yielded.places.extend(places.into_iter().map(|place| PlaceOfMove { line, mv, place }));
     }
     yielded.real = real.parts();
-    yielded.nominal = nominal.parts();
+    yielded.nominal = meant.after.parts();
     Ok(yielded)
 }
 

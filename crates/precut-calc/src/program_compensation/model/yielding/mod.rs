@@ -11,5 +11,5 @@ mod outline;
 mod sections;
 
 pub(crate) use contour::{ContourError, contour};
-pub(crate) use cut::CutPlace;
-pub(crate) use drive::{FAILURE_CODES, Yielded, yielding};
+pub(crate) use cut::{AXIS_MM, CutPlace};
+pub(crate) use drive::{Driven, FAILURE_CODES, PlaceOfMove, Yielded, yielding};

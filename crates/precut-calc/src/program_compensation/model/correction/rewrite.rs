@@ -1,0 +1,361 @@
+//! Shifts written into a program: numbers of X, and lines for further pieces. Nothing else changes (`program/6`).
+
+use std::fmt::Write as _;
+use std::ops::Range;
+
+use super::super::super::job::{Dialect, Mode};
+use super::super::reader::{Kind, NumberInText, Program, ProgramMove, WordsOfLine, lines_of_text};
+use super::plan::Shifts;
+
+/// Lengths that are no different, mm.
+const SAME_MM: f64 = 1e-7;
+/// Least step of an inch that controls have, inch.
+const INCH_STEP: f64 = 1e-4;
+const MM_PER_UM: f64 = 1e-3;
+
+/// A line that becomes others.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ChangedLine {
+    /// Line of the given program, from 1.
+    pub(crate) line: usize,
+    /// Without its end.
+    pub(crate) old: String,
+    pub(crate) new: Vec<String>,
+    /// Least and largest shift along it, on the diameter, um.
+    pub(crate) smallest_shift_um: f64,
+    pub(crate) largest_shift_um: f64,
+}
+
+/// A program with its shifts.
+#[derive(Debug, Clone)]
+pub(crate) struct Written {
+    pub(crate) text: String,
+    pub(crate) changed: Vec<ChangedLine>,
+    /// How many moves stand for each of the program's.
+    pub(crate) pieces: Vec<usize>,
+}
+
+impl Written {
+    /// The line of the given program of which a line of the new one came.
+    pub(crate) fn given_line(&self, line: usize) -> usize {
+        let mut added = 0;
+        for changed in &self.changed {
+            if changed.line + added >= line {
+                break;
+            }
+            added += (changed.new.len() - 1).min(line - changed.line - added);
+        }
+        line - added
+    }
+
+    /// What became of a line of the given program.
+    pub(crate) fn change(&self, line: usize) -> Option<&ChangedLine> {
+        self.changed.binary_search_by_key(&line, |changed| changed.line).ok().map(|at| &self.changed[at])
+    }
+
+    /// Of which move of the given program every move of the new one is a piece.
+    pub(crate) fn moves(&self) -> Vec<usize> {
+        self.pieces.iter().enumerate().flat_map(|(mv, &pieces)| std::iter::repeat_n(mv, pieces)).collect()
+    }
+
+    /// The line of the new program that a line of the old one became; of several the last one.
+    pub(crate) fn line(&self, line: usize) -> usize {
+        let added = |changed: &&ChangedLine| changed.line <= line;
+        line + self.changed.iter().filter(added).map(|changed| changed.new.len().saturating_sub(1)).sum::<usize>()
+    }
+}
+
+/// Where the tool is after a move: diameter and z, mm.
+type Point = [f64; 2];
+
+/// Writes the shifts into the text.
+pub(crate) fn rewritten(text: &str, dialect: Dialect, program: &Program, shifts: &Shifts, mode: &Mode) -> Written {
+    let lines = lines_of_text(text);
+    let mut written = Written { text: String::new(), changed: Vec::new(), pieces: vec![1; program.moves.len()] };
+    // Where the tool really is, and where the program means it to be.
+    let (mut real, mut meant): (Option<Point>, Option<Point>) = (None, None);
+    for (index, one) in program.moves.iter().enumerate() {
+        let end = one.end.known();
+        let words = program.words_of_lines.get(&one.line).and_then(Option::as_ref).filter(|words| words.mv == index);
+        let mut arrived = end;
+        if let (Some(words), Some(end), Some(range)) = (words, end, lines.get(one.line - 1)) {
+            let line = Line { text, range: range.clone(), words, dialect, one, step: step(words, mode) };
+            let pieces = line.pieces(shifts, index, meant, end);
+            // A place that nobody knows is not shifted.
+            let from = real.or(meant);
+            if let Some((new, last)) = line.rewritten(&pieces, from, meant) {
+                written.pieces[index] = pieces.len();
+                let shift = |piece: &Piece| 2.0 * piece.shift_mm / MM_PER_UM;
+                written.changed.push(ChangedLine {
+                    line: one.line,
+                    old: text[range.clone()].to_owned(),
+                    new,
+                    smallest_shift_um: pieces.iter().map(shift).fold(f64::INFINITY, f64::min),
+                    largest_shift_um: pieces.iter().map(shift).fold(f64::NEG_INFINITY, f64::max),
+                });
+                arrived = Some(last);
+            } else if let (Some(from), Some(meant), None) = (from, meant, &words.x) {
+                // Without a word of X the tool stays where it is.
+                arrived = Some([from[0] + end[0] - meant[0], end[1]]);
+            }
+        }
+        (real, meant) = (arrived, end);
+    }
+    written.changed.sort_by_key(|one| one.line);
+    written.text = applied(text, &lines, &written.changed);
+    written
+}
+
+/// The text with lines replaced, each with its own line end.
+fn applied(text: &str, lines: &[Range<usize>], changed: &[ChangedLine]) -> String {
+    let mut out = String::with_capacity(text.len() + 64 * changed.len());
+    let mut at = 0;
+    for one in changed {
+        let Some(range) = lines.get(one.line - 1) else { continue };
+        let behind = lines.get(one.line).map_or(text.len(), |next| next.start);
+        let own = &text[range.end..behind];
+        let end = if own.is_empty() { "\n" } else { own };
+        out.push_str(&text[at..range.start]);
+        out.push_str(&one.new.join(end));
+        at = range.end;
+    }
+    out.push_str(&text[at..]);
+    out
+}
+
+/// The least step of X as it is written, in its unit.
+fn step(words: &WordsOfLine, mode: &Mode) -> f64 {
+    if words.unit_z_mm > 1.0 { INCH_STEP } else { mode.increment_um * MM_PER_UM }
+}
+
+/// A piece of a move: its end and the shift of the radius there.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    end: Point,
+    share: f64,
+    shift_mm: f64,
+}
+
+/// A line that makes one move.
+struct Line<'a> {
+    text: &'a str,
+    range: Range<usize>,
+    words: &'a WordsOfLine,
+    dialect: Dialect,
+    one: &'a ProgramMove,
+    step: f64,
+}
+
+/// Pieces without those that go on as straight as the ones before them.
+fn without_straight(first: Piece, pieces: Vec<Piece>, within_mm: f64) -> Vec<Piece> {
+    let mut kept: Vec<Piece> = vec![first];
+    for piece in pieces {
+        if let [.., before, middle] = kept[..] {
+            let share = (middle.share - before.share) / (piece.share - before.share);
+            let straight = before.shift_mm + share * (piece.shift_mm - before.shift_mm);
+            if (straight - middle.shift_mm).abs() <= within_mm {
+                kept.pop();
+            }
+        }
+        kept.push(piece);
+    }
+    kept.split_off(1)
+}
+
+/// Nearest whole multiple, halves away from zero.
+fn rounded(value: f64, grid: f64) -> f64 {
+    (value / grid).round() * grid
+}
+
+impl Line<'_> {
+    /// Where the pieces of the move end, rounded as they can be written.
+    fn pieces(&self, shifts: &Shifts, index: usize, from: Option<Point>, end: Point) -> Vec<Piece> {
+        let unit = self.words.x.as_ref().map_or(self.words.unit_x_mm, |x| x.unit_mm.max(self.words.unit_x_mm));
+        let grid = [unit * self.step, self.words.unit_z_mm * self.step];
+        let at = |share: f64, shift_mm: f64| {
+            let (share, meant) =
+                if share >= 1.0 { (1.0, end) } else { self.at_step(from.unwrap_or(end), end, share, grid[1]) };
+            let x = if shift_mm.abs() > 0.0 { rounded(meant[0] + 2.0 * shift_mm, grid[0]) } else { meant[0] };
+            let x = if (x - meant[0]).abs() < 0.5 * grid[0] { meant[0] } else { x };
+            let z = if share >= 1.0 { end[1] } else { rounded(meant[1], grid[1]) };
+            Piece { end: [x, z], share, shift_mm: 0.5 * (x - meant[0]) }
+        };
+        match (shifts.knots.get(&index), shifts.ends.get(&index)) {
+            (Some(knots), _) => {
+                let first =
+                    Piece { end: from.unwrap_or(end), share: 0.0, shift_mm: knots.first().map_or(0.0, |knot| knot[1]) };
+                let pieces = knots.iter().skip(1).map(|&[share, shift]| at(share, shift));
+                without_straight(first, pieces.collect(), 0.125 * grid[0])
+            }
+            (None, Some(&shift)) => vec![at(1.0, shift)],
+            (None, None) => vec![Piece { end, share: 1.0, shift_mm: 0.0 }],
+        }
+    }
+
+    /// A place of the move as it is meant, near a share of it, where z can be written: its share, diameter and z.
+    fn at_step(&self, from: Point, to: Point, share: f64, grid_mm: f64) -> (f64, Point) {
+        let about = self.at(from, to, share);
+        let small = 1e-4 * (1.0 - share).min(1.0);
+        let slope = (self.at(from, to, share + small)[1] - about[1]) / small;
+        let off = rounded(about[1], grid_mm) - about[1];
+        // Along a wall z says nothing of the place.
+        if slope.abs() < 1e3 * grid_mm {
+            return (share, about);
+        }
+        let share = share + off / slope;
+        (share, self.at(from, to, share))
+    }
+
+    /// A place of the move as it is meant: diameter and z.
+    fn at(&self, from: Point, to: Point, share: f64) -> Point {
+        let Some([cx, cz]) = self.one.centre else {
+            return [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])];
+        };
+        let angle = |point: Point| (0.5 * (point[0] - cx)).atan2(point[1] - cz);
+        let radius = (0.5 * (from[0] - cx)).hypot(from[1] - cz);
+        let full = std::f64::consts::TAU;
+        let turn = if self.one.kind == Kind::ArcCcw {
+            (angle(to) - angle(from)).rem_euclid(full)
+        } else {
+            -(angle(from) - angle(to)).rem_euclid(full)
+        };
+        let angle = angle(from) + share * turn;
+        [cx + 2.0 * radius * angle.sin(), cz + radius * angle.cos()]
+    }
+
+    /// The lines, and where the tool is after them; none where the line stays as it is.
+    fn rewritten(&self, pieces: &[Piece], from: Option<Point>, meant: Option<Point>) -> Option<(Vec<String>, Point)> {
+        let (first, rest) = pieces.split_first()?;
+        let is_moved = from.zip(meant).is_some_and(|(from, meant)| (from[0] - meant[0]).abs() > SAME_MM);
+        let stays = |piece: &Piece| piece.shift_mm.abs() <= SAME_MM;
+        // A relative word, or none, ends elsewhere if the tool begins elsewhere.
+        let hangs = self.words.x.as_ref().is_none_or(|x| x.is_relative);
+        if rest.is_empty() && stays(first) && !(is_moved && hangs) {
+            return None;
+        }
+        let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+        match &self.words.x {
+            Some(x) => {
+                let length = first.end[0] - if x.is_relative { from?[0] } else { 0.0 };
+                edits.push((x.range.clone(), self.number(length, x)));
+            }
+            None if from.is_some_and(|from| (from[0] - first.end[0]).abs() <= SAME_MM) => {}
+            None => {
+                let length = first.end[0] - if self.words.is_relative { from?[0] } else { 0.0 };
+                edits.push((self.words.put_in_at..self.words.put_in_at, self.put_in(length)));
+            }
+        }
+        if !rest.is_empty() {
+            let z = self.words.z.as_ref()?;
+            let length = first.end[1] - if z.is_relative { from?[1] } else { 0.0 };
+            edits.push((z.range.clone(), self.number(length, z)));
+        }
+        edits.sort_by_key(|(range, _)| range.start);
+        let (mut line, mut at) = (String::new(), self.range.start);
+        for (range, new) in edits {
+            line.push_str(&self.text[at..range.start]);
+            line.push_str(&new);
+            at = range.end;
+        }
+        line.push_str(&self.text[at..self.range.end]);
+        let mut lines = Vec::with_capacity(pieces.len());
+        let is_same = line == self.text[self.range.clone()];
+        lines.push(line);
+        let mut last = first.end;
+        for piece in rest {
+            lines.push(self.further(last, piece.end));
+            last = piece.end;
+        }
+        (!(is_same && rest.is_empty())).then_some((lines, last))
+    }
+
+    fn is_small(&self) -> bool {
+        self.text[self.range.clone()].bytes().any(|byte| matches!(byte, b'x' | b'z' | b'u' | b'w'))
+    }
+
+    fn has_blanks(&self) -> bool {
+        self.text[self.range.clone()].trim().contains(' ')
+    }
+
+    /// A word of X for a line that has none, and what parts it from its neighbour.
+    fn put_in(&self, length_mm: f64) -> String {
+        let word = self.word('X', length_mm, self.words.unit_x_mm);
+        let is_before_z = self.words.z.is_some();
+        match (self.has_blanks(), is_before_z) {
+            (true, true) => word + " ",
+            (true, false) => format!(" {word}"),
+            (false, _) => word,
+        }
+    }
+
+    fn word(&self, letter: char, length_mm: f64, unit_mm: f64) -> String {
+        let letter = if self.is_small() { letter.to_ascii_lowercase() } else { letter };
+        format!("{letter}{}", decimal(length_mm / unit_mm, self.step))
+    }
+
+    /// A line of its own for a further piece.
+    fn further(&self, from: Point, to: Point) -> String {
+        let base = if self.words.is_relative { from } else { [0.0; 2] };
+        let blank = if self.has_blanks() { " " } else { "" };
+        let mut line = self.word('X', to[0] - base[0], self.words.unit_x_mm);
+        let _ = write!(line, "{blank}{}", self.word('Z', to[1] - base[1], self.words.unit_z_mm));
+        if let Some(radius) = &self.words.radius {
+            let is_name = self.dialect == Dialect::Siemens;
+            let parted = if is_name { " " } else { blank };
+            let _ = write!(line, "{parted}{}", &self.text[radius.clone()]);
+        }
+        line
+    }
+
+    /// A number in the form of the one that it replaces.
+    fn number(&self, length_mm: f64, old: &NumberInText) -> String {
+        let before = &self.text[old.range.clone()];
+        if let Some(step_mm) = old.step_mm {
+            let steps = length_mm / step_mm;
+            if (steps - steps.round()).abs() < 1e-6 {
+                return format!("{:.0}", steps.round() + 0.0);
+            }
+        }
+        let value = length_mm / old.unit_mm;
+        let mut number = decimal(value, self.step);
+        // As many decimals as there were.
+        if let Some((_, decimals)) = before.split_once('.') {
+            let kept = decimals.chars().filter(char::is_ascii_digit).count();
+            let now = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+            number.extend(std::iter::repeat_n('0', kept.saturating_sub(now)));
+        }
+        let bare = before.trim_start_matches(['+', '-']);
+        if bare.starts_with('.') {
+            number = number.replacen("0.", ".", 1);
+        }
+        if before.starts_with('+') && !number.starts_with('-') {
+            number.insert(0, '+');
+        }
+        number
+    }
+}
+
+/// A number with a decimal point and no more decimals than it needs.
+fn decimal(value: f64, step: f64) -> String {
+    // A step has six decimals at the most.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let decimals = (-step.log10() - 1e-9).ceil().clamp(1.0, 6.0) as usize;
+    let value = rounded(value, step) + 0.0;
+    let mut text = format!("{value:.decimals$}");
+    text.truncate(text.trim_end_matches('0').len());
+    if text.starts_with("-0.") && value.abs() < 0.5 * step {
+        text.remove(0);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_decimals_that_they_need() {
+        let written = [21.995, 22.0, -0.0004, 0.5, -3.1].map(|value| decimal(value, 1e-3));
+        assert_eq!(written, ["21.995", "22.", "0.", "0.5", "-3.1"]);
+    }
+}

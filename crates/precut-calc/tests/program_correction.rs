@@ -1,0 +1,245 @@
+//! Programs that are corrected: what they leave is seen by driving what is given back, as any other program.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss, missing_docs)]
+
+use std::fmt::Write as _;
+use std::process::{Command, Stdio};
+
+use precut_calc::calculator::Answer;
+use precut_calc::program_compensation::{CompensatedProgram, ErrorAlong, Outcome, Transition, WhyLeftAlone};
+use serde_json::{Value, json};
+
+use crate::draw::Draw;
+use crate::program_yielding::{DIALECTS, cases, job_of, shaft, try_solve};
+
+/// Chord tolerance and increment, on the radius, um.
+const RESIDUAL_UM: f64 = 1.5;
+
+fn compensation(answer: &Answer<Outcome>) -> &CompensatedProgram {
+    answer.output.compensation.as_ref().unwrap()
+}
+
+fn compensate(job: &Value) -> Value {
+    let mut job = job.clone();
+    job["mode"] = json!({ "kind": "compensate" });
+    job
+}
+
+/// The job that drives what was given back as a program of its own.
+fn again(job: &Value, compensation: &CompensatedProgram) -> Value {
+    let mut again = job.clone();
+    again["nc_program"] = json!(compensation.nc_program);
+    again["mode"] = json!({ "kind": "read" });
+    for lines in again.get_mut("support_lines").and_then(Value::as_array_mut).into_iter().flatten() {
+        let from = lines["from_line"].as_u64().unwrap();
+        let added: usize = compensation
+            .changes
+            .iter()
+            .filter(|change| (change.line as u64) < from)
+            .map(|change| change.new.len() - 1)
+            .sum();
+        lines["from_line"] = json!(from + added as u64);
+    }
+    again
+}
+
+/// The diameter that a contour really has at a place, by what one line makes.
+fn real(contour: &ErrorAlong, z: f64) -> Option<f64> {
+    let at = |i: usize| contour.wanted_diameter_mm[i] + contour.diameter_error_um[i] / 1000.0;
+    let after = contour.z_mm.partition_point(|place| *place < z);
+    let before = after.checked_sub(1)?;
+    // A round corner is not straight between its places.
+    let is_straight = |a: usize, b: usize| (contour.wanted_diameter_mm[a] - contour.wanted_diameter_mm[b]).abs() < 0.05;
+    if after == contour.z_mm.len() || contour.line[after] != contour.line[before] || !is_straight(before, after) {
+        return None;
+    }
+    let share = (z - contour.z_mm[before]) / (contour.z_mm[after] - contour.z_mm[before]);
+    Some(at(before) + share * (at(after) - at(before)))
+}
+
+/// Every line that is not among the changed ones stands in the returned program, byte for byte and in its order.
+fn assert_rest_is_kept(given: &str, compensation: &CompensatedProgram) {
+    let mut expected = String::new();
+    let lines: Vec<&str> = given.split_inclusive('\n').collect();
+    for (i, line) in lines.iter().enumerate() {
+        match compensation.changes.iter().find(|change| change.line == i + 1) {
+            None => expected.push_str(line),
+            Some(change) => {
+                assert_eq!(change.old, line.trim_end_matches(['\r', '\n']));
+                let end = &line[change.old.len()..];
+                change.new.iter().for_each(|new| {
+                    let _ = write!(expected, "{new}{end}");
+                });
+            }
+        }
+    }
+    assert_eq!(compensation.nc_program, expected);
+}
+
+#[test]
+fn the_reference_programs_come_out_as_they_are_meant() {
+    let mut wrong = String::new();
+    for case in cases() {
+        let name = case["name"].as_str().unwrap();
+        let job = job_of(&case["job"]);
+        let answer = match try_solve(&compensate(&job)) {
+            Ok(answer) => answer,
+            Err(failure) => {
+                let _ = writeln!(wrong, "{name}: {failure:?}");
+                continue;
+            }
+        };
+        let compensation = compensation(&answer);
+        let may: Vec<u64> = case["expected"]["lines_that_may_change"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|line| line.as_u64().unwrap())
+            .collect();
+        let said = format!(
+            "{name}: {:?}\n{:?}\n{:?}\n{}",
+            compensation.proof, compensation.left_alone, compensation.transitions, compensation.diff
+        );
+        println!("{said}");
+        let is_allowed = compensation.lines_changed.iter().all(|line| may.contains(&(*line as u64)));
+        assert!(is_allowed && !compensation.lines_changed.is_empty(), "{said}");
+        assert_rest_is_kept(job["nc_program"].as_str().unwrap(), compensation);
+        let only_faces = compensation.left_alone.iter().all(|left| left.reason == WhyLeftAlone::Face);
+        let proof = compensation.proof.unwrap();
+        let longest = compensation.transitions.iter().map(|one| one.length_mm).fold(0.0, f64::max);
+        if !only_faces || proof.largest_residual_um > RESIDUAL_UM || proof.largest_error_after_um > 2.0 * RESIDUAL_UM {
+            let _ = writeln!(wrong, "{said}");
+        }
+        // The longest is beside the finished seat, where the shift jumps by 0.1 mm.
+        assert!(longest < if name == "step-in-blank" { 4.0 } else { 0.7 }, "{said}");
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}
+
+/// Whether LinuxCNC's own interpreter runs a program to its end; told and passed over where it is not installed.
+fn is_run_by_linuxcnc(program: &str) -> bool {
+    let folder = std::env::temp_dir().join(format!("precut-correction-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("program.ngc");
+    std::fs::write(&file, program).unwrap();
+    let run = Command::new("rs274").arg("-g").arg(&file).current_dir(&folder).stdin(Stdio::null()).output();
+    let _ = std::fs::remove_dir_all(&folder);
+    let Ok(output) = run else {
+        println!("rs274 is not here");
+        return true;
+    };
+    let said = String::from_utf8_lossy(&output.stdout);
+    output.status.success() && said.contains("STRAIGHT_FEED") && said.contains("PROGRAM_END")
+}
+
+/// What an answer says of the returned program, comes of it when it is driven as a program of its own.
+#[test]
+fn programs_of_every_control_are_corrected_and_proved() {
+    let (mut changed, mut changed_lines, mut left, mut wrong) = (0, 0, 0, String::new());
+    let mut worst = 0.0_f64;
+    for seed in 0..draws(6) {
+        let mut in_all: Option<Vec<usize>> = None;
+        for dialect in DIALECTS {
+            let mut job = shaft(&mut Draw::new(2000 + seed), dialect);
+            job["force"]["specific_normal_force_n_per_mm2"] = json!(2500);
+            let answer = match try_solve(&compensate(&job)) {
+                Ok(answer) => answer,
+                Err(failure) => {
+                    let _ = writeln!(wrong, "{dialect} {seed}: {failure:?}\n{}", job["nc_program"].as_str().unwrap());
+                    continue;
+                }
+            };
+            let compensation = compensation(&answer);
+            assert_rest_is_kept(job["nc_program"].as_str().unwrap(), compensation);
+            let lines = in_all.get_or_insert_with(|| compensation.lines_changed.clone());
+            assert_eq!(*lines, compensation.lines_changed, "{dialect} {seed}");
+            left +=
+                compensation.left_alone.iter().filter(|left| left.reason == WhyLeftAlone::NotSupportedByModel).count();
+            if dialect == "linuxcnc" {
+                assert!(is_run_by_linuxcnc(&compensation.nc_program), "{}", compensation.nc_program);
+            }
+            let Some(proof) = &compensation.proof else { continue };
+            changed += 1;
+            changed_lines += compensation.lines_changed.len();
+            assert!(proof.largest_residual_um <= RESIDUAL_UM, "{proof:?}");
+            let returned = try_solve(&again(&job, compensation)).unwrap();
+            let (told, contour) = (&compensation.contour, &returned.output.yielding.as_ref().unwrap().contour);
+            let mut compared = 0;
+            for i in 0..told.z_mm.len() {
+                let z = told.z_mm[i];
+                // Where the work stays thick the error has a point, and round corners are not straight between places.
+                let is_thick = |one: &Transition| (one.z_mm - 0.3..one.z_mm + one.length_mm + 0.3).contains(&z);
+                let beside = [i.saturating_sub(1), (i + 1).min(told.z_mm.len() - 1)];
+                let is_round =
+                    beside.iter().any(|&j| (told.wanted_diameter_mm[i] - told.wanted_diameter_mm[j]).abs() > 1e-6);
+                if is_round || compensation.transitions.iter().any(is_thick) {
+                    continue;
+                }
+                let Some(real) = real(contour, z) else { continue };
+                let error = 1000.0 * (real - told.wanted_diameter_mm[i]);
+                worst = worst.max((error - told.diameter_error_um[i]).abs());
+                if (error - told.diameter_error_um[i]).abs() > 0.5 {
+                    let _ = writeln!(wrong, "{dialect} {seed} at {z}: {error}, told {}", told.diameter_error_um[i]);
+                }
+                compared += 1;
+            }
+            assert!(compared > 10, "{compared} of {}", told.z_mm.len());
+        }
+    }
+    println!("{changed} programs and {changed_lines} lines changed, {left} lines left; {worst} um");
+    assert!(wrong.is_empty(), "{wrong}");
+    assert!(changed > 20, "{changed}");
+}
+
+fn draws(in_the_suite: u64) -> u64 {
+    std::env::var("PRECUT_PROGRAMS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .map_or(in_the_suite, |all: u64| all.div_ceil(5))
+}
+
+#[test]
+fn rigid_work_changes_no_line() {
+    let mut job = shaft(&mut Draw::new(950), "fanuc_a");
+    job["force"]["specific_normal_force_n_per_mm2"] = json!(1e-3);
+    let answer = try_solve(&compensate(&job)).unwrap();
+    let compensation = compensation(&answer);
+    assert_eq!(
+        (compensation.nc_program.as_str(), compensation.diff.as_str()),
+        (job["nc_program"].as_str().unwrap(), "")
+    );
+    assert!(compensation.proof.is_none() && compensation.lines_changed.is_empty());
+    assert!(answer.explanation.iter().any(|said| said.code == "nothing_to_correct"));
+}
+
+/// A program that goes through stock as it is gets no new one.
+#[test]
+fn a_program_that_does_harm_is_not_corrected() {
+    let mut job = shaft(&mut Draw::new(950), "fanuc_a");
+    job["nc_program"] = json!(job["nc_program"].as_str().unwrap().replacen("G1 X", "G0 X", 1));
+    let answer = try_solve(&compensate(&job)).unwrap();
+    assert!(answer.output.compensation.is_none());
+    let codes: Vec<&str> = answer.warnings.iter().map(|warning| warning.code).collect();
+    assert!(codes.contains(&"rapid_in_stock") && codes.contains(&"program_unsafe"), "{codes:?}");
+}
+
+/// Ends of lines, small letters, comments, block numbers and relative words stay what they are.
+#[test]
+fn words_keep_their_form() {
+    let mut job = job_of(&cases()[0]["job"]);
+    for (given, expected) in [
+        ("N70 g1 w-2002. f0.5 (cut)\r\n", "N70 g1 x"),
+        ("N70 G1Z-2000.F.5;CUT\r\n", "N70 G1X"),
+        ("N70 G1 X+090.00 Z-2000.0 F0.5\r\n", "N70 G1 X+89."),
+    ] {
+        let program =
+            format!("G21 G18 G40 G99\r\nT0101\r\nG97 S500 M3\r\nG0 X96. Z2.\r\nX90.\r\n{given}G0 X96.\r\nM30\r\n");
+        job["nc_program"] = json!(program);
+        let answer = try_solve(&compensate(&job)).unwrap();
+        let compensation = compensation(&answer);
+        assert_rest_is_kept(&program, compensation);
+        let [change] = compensation.changes.as_slice() else { panic!("{:?}", compensation.changes) };
+        let tail = &given[given.find(['f', 'F']).unwrap()..given.len() - 2];
+        assert!(change.new[0].starts_with(expected) && change.new[0].ends_with(tail), "{:?}", change.new);
+        assert!(change.new.len() > 5 && compensation.nc_program.matches("\r\n").count() == 7 + change.new.len());
+    }
+}
