@@ -134,7 +134,7 @@ fn is_run_by_linuxcnc(program: &str) -> bool {
 /// What an answer says of the returned program, comes of it when it is driven as a program of its own.
 #[test]
 fn programs_of_every_control_are_corrected_and_proved() {
-    let (mut changed, mut changed_lines, mut left, mut wrong) = (0, 0, 0, String::new());
+    let (mut changed, mut changed_lines, mut left, mut compared, mut wrong) = (0, 0, 0, 0, String::new());
     let mut worst = 0.0_f64;
     for seed in 0..draws(6) {
         let mut in_all: Option<Vec<usize>> = None;
@@ -163,7 +163,6 @@ fn programs_of_every_control_are_corrected_and_proved() {
             assert!(proof.largest_residual_um <= RESIDUAL_UM, "{proof:?}");
             let returned = try_solve(&again(&job, compensation)).unwrap();
             let (told, contour) = (&compensation.contour, &returned.output.yielding.as_ref().unwrap().contour);
-            let mut compared = 0;
             for i in 0..told.z_mm.len() {
                 let z = told.z_mm[i];
                 // Where the work stays thick the error has a point, and round corners are not straight between places.
@@ -182,12 +181,11 @@ fn programs_of_every_control_are_corrected_and_proved() {
                 }
                 compared += 1;
             }
-            assert!(compared > 10, "{compared} of {}", told.z_mm.len());
         }
     }
     println!("{changed} programs and {changed_lines} lines changed, {left} lines left; {worst} um");
     assert!(wrong.is_empty(), "{wrong}");
-    assert!(changed > 20, "{changed}");
+    assert!(changed > 20 && compared > 30 * changed, "{changed}, {compared}");
 }
 
 fn draws(in_the_suite: u64) -> u64 {
@@ -228,7 +226,7 @@ fn words_keep_their_form() {
     let mut job = job_of(&cases()[0]["job"]);
     for (given, expected) in [
         ("N70 g1 w-2002. f0.5 (cut)\r\n", "N70 g1 x"),
-        ("N70 G1Z-2000.F.5;CUT\r\n", "N70 G1X"),
+        ("N70 G1Z-2000.F.5;cut\r\n", "N70 G1X"),
         ("N70 G1 X+090.00 Z-2000.0 F0.5\r\n", "N70 G1 X+89."),
     ] {
         let program =

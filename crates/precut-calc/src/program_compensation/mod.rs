@@ -63,7 +63,7 @@ impl Calculator for ProgramCompensation {
             },
             Example {
                 id: "slender_shaft",
-                title: "Slender shaft between chuck and centre: what its program leaves where work and machine yield",
+                title: "Slender shaft between chuck and centre: its program, and the one that leaves no error",
                 job: include_str!("examples/slender_shaft.json"),
             },
         ],

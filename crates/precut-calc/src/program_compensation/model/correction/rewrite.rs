@@ -269,8 +269,11 @@ impl Line<'_> {
         (!(is_same && rest.is_empty())).then_some((lines, last))
     }
 
+    /// Whether its words have small letters; comments say nothing of that.
     fn is_small(&self) -> bool {
-        self.text[self.range.clone()].bytes().any(|byte| matches!(byte, b'x' | b'z' | b'u' | b'w'))
+        let number = self.words.z.as_ref().or(self.words.x.as_ref());
+        let before = number.map_or("", |number| &self.text[self.range.start..number.range.start]);
+        before.bytes().rev().find(u8::is_ascii_alphabetic).is_some_and(|letter| letter.is_ascii_lowercase())
     }
 
     fn has_blanks(&self) -> bool {
