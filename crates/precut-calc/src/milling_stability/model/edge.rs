@@ -22,7 +22,7 @@ pub struct Entry {
 
 /// Sums over all edges at one instant.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Instant {
+pub struct Engagement {
     /// By rotation since the passage whose surface is met.
     pub entries: Vec<Entry>,
     /// Process damping times the cutting speed, N/mm s mm/s.
@@ -159,8 +159,8 @@ impl<'a> Edges<'a> {
     }
 
     /// Cutting stiffness and process damping at a rotation (`milling/2.6`).
-    pub fn at(&self, rotation_rad: f64) -> Instant {
-        let mut sums = Instant::default();
+    pub fn at(&self, rotation_rad: f64) -> Engagement {
+        let mut sums = Engagement::default();
         let factor = self.milling.depth_factor(self.depth_mm);
         for tooth in 0..self.milling.teeth.len() {
             let lag = self.milling.teeth[tooth].lag_rad_per_mm;
@@ -213,7 +213,7 @@ impl<'a> Edges<'a> {
     }
 }
 
-impl Instant {
+impl Engagement {
     fn add(&mut self, turned_rad: f64, stiffness: &Tensor, factor: f64) {
         let known = self.entries.iter_mut().find(|entry| (entry.turned_rad - turned_rad).abs() < 1e-12);
         match known {

@@ -11,7 +11,7 @@ mod structure;
 mod zeroth;
 
 pub use cutter::{Law, Milling, Rubbing, Tensor, Tooth, Vector};
-pub use edge::{Edges, Entry, Instant};
+pub use edge::{Edges, Engagement, Entry};
 pub use intervals::{Crossing, Unstable, crossings, unstable};
 pub use map::{Cut, Map};
 pub use multiplier::{Kind, Multiplier, Orders};
