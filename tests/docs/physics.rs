@@ -22,7 +22,7 @@ const CATALOGUES: [(&[Cause], &str); 4] = [
 ];
 
 /// Groups of equations.
-const GROUPS: [&str; 11] = [
+const GROUPS: [&str; 12] = [
     "clamping/",
     "cylindricity/",
     "deflection/",
@@ -31,6 +31,7 @@ const GROUPS: [&str; 11] = [
     "fit/",
     "fixture/",
     "library/",
+    "milling/",
     "program/",
     "ring/",
     "roundness/",

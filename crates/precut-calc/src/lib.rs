@@ -15,6 +15,7 @@ pub mod fixture_stability;
 pub mod force;
 pub mod machinability;
 pub mod material;
+pub mod milling_stability;
 pub mod num;
 pub mod path;
 pub mod process;

@@ -16,6 +16,7 @@ pub struct Rule<const P: usize> {
     pub points: [f64; P],
     moment: Vec<[[f64; P]; P]>,
     moment_end: Vec<[f64; P]>,
+    basis: Lagrange<P>,
 }
 
 impl<const P: usize> Rule<P> {
@@ -50,11 +51,17 @@ impl<const P: usize> Rule<P> {
             integrals(c, &mut |m, row| sum(&mut moment[m][i], row));
         }
         integrals(1.0, &mut |m, row| sum(&mut moment_end[m], row));
-        Self { points, moment, moment_end }
+        Self { points, moment, moment_end, basis }
+    }
+
+    /// Weights of the values at the points that make the value of their polynomial elsewhere, 0..1 inside the element.
+    pub fn weights_at(&self, share: f64) -> [f64; P] {
+        self.basis.at(share)
     }
 }
 
 /// The Lagrange polynomials on the points, all at once.
+#[derive(Debug, Clone)]
 struct Lagrange<const P: usize> {
     points: [f64; P],
     /// Over the product of the distances of each point from the others.

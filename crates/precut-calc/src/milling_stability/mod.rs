@@ -1,0 +1,3 @@
+//! Milling in three directions: how deep may this cutter go before it chatters?
+
+pub mod model;

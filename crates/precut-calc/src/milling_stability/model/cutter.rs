@@ -1,0 +1,214 @@
+//! The cutter in its cut: teeth with their own pitch, helix and run-out, and the force of an edge.
+
+use std::f64::consts::TAU;
+
+/// A vector in the axes of the cut: x along the feed, y across it, z along the spindle.
+pub type Vector = [f64; 3];
+/// A matrix in the same axes, row by row.
+pub type Tensor = [[f64; 3]; 3];
+
+/// One tooth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tooth {
+    /// Angle from this tooth to the tooth before it, at the tip, rad.
+    pub pitch_rad: f64,
+    /// tan(helix)/R: how far the edge lags per mm of height, rad/mm.
+    pub lag_rad_per_mm: f64,
+    /// How far it stands out, mm.
+    pub radial_mm: f64,
+    /// How far it stands down, mm.
+    pub axial_mm: f64,
+}
+
+/// Force per mm of edge over the thickness of the chip (`milling/2.3`), tangential, radial, axial.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// An edge force, N/mm, and one that grows with the chip, N/mm2.
+    Mechanistic {
+        /// At no chip, N/mm.
+        edge: Vector,
+        /// Per mm of chip, N/mm2.
+        cutting: Vector,
+    },
+    /// A power of the chip, below the floor a straight line.
+    Power {
+        /// At 1 mm of chip, N/mm2.
+        at_1_mm: Vector,
+        /// How much less than in proportion it grows.
+        exponent: Vector,
+        /// The floor, mm.
+        floor_mm: f64,
+    },
+}
+
+impl Law {
+    /// Whether the slope changes with the chip.
+    pub fn bends(&self) -> bool {
+        matches!(self, Self::Power { exponent, .. } if exponent.iter().any(|e| *e > 0.0))
+    }
+
+    /// Force per mm of edge, N/mm.
+    pub fn force(&self, chip_mm: f64) -> Vector {
+        match self {
+            Self::Mechanistic { edge, cutting } => std::array::from_fn(|q| edge[q] + cutting[q] * chip_mm),
+            Self::Power { at_1_mm, exponent, floor_mm } => std::array::from_fn(|q| {
+                if chip_mm >= *floor_mm {
+                    at_1_mm[q] * chip_mm.powf(1.0 - exponent[q])
+                } else {
+                    at_1_mm[q] * floor_mm.powf(-exponent[q]) * chip_mm
+                }
+            }),
+        }
+    }
+
+    /// Its slope over the chip, N/mm2 (`milling/2.5`).
+    pub fn slope(&self, chip_mm: f64) -> Vector {
+        match self {
+            Self::Mechanistic { cutting, .. } => *cutting,
+            Self::Power { at_1_mm, exponent, floor_mm } => std::array::from_fn(|q| {
+                if chip_mm >= *floor_mm {
+                    (1.0 - exponent[q]) * at_1_mm[q] * chip_mm.powf(-exponent[q])
+                } else {
+                    at_1_mm[q] * floor_mm.powf(-exponent[q])
+                }
+            }),
+        }
+    }
+}
+
+/// Rubbing of the flank in the wave that it left (`milling/2.8`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rubbing {
+    /// K_w, N/mm.
+    pub coefficient_n_per_mm: f64,
+    /// Tangential over radial.
+    pub friction: f64,
+}
+
+/// Cutter, engagement and law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Milling {
+    /// Radius over the tips, mm.
+    pub radius_mm: f64,
+    /// In the order in which they pass.
+    pub teeth: Vec<Tooth>,
+    /// kappa, rad.
+    pub edge_angle_rad: f64,
+    /// Where a tooth enters, rad from +y.
+    pub entry_rad: f64,
+    /// Where it leaves.
+    pub exit_rad: f64,
+    /// Mean feed per tooth, mm.
+    pub feed_mm: f64,
+    /// Force of an edge.
+    pub law: Law,
+    /// mu: the force goes with the power 1-mu of the depth.
+    pub depth_exponent: f64,
+    /// Process damping, where there is some.
+    pub rubbing: Option<Rubbing>,
+}
+
+impl Milling {
+    /// Sum of the pitches of teeth 1..j: how far tooth j is behind tooth 0 at the tip.
+    pub fn behind_rad(&self, tooth: usize) -> f64 {
+        self.teeth[1..=tooth].iter().map(|t| t.pitch_rad).sum()
+    }
+
+    /// The tooth that passed l teeth before.
+    pub fn before(&self, tooth: usize, l: usize) -> usize {
+        (tooth + self.teeth.len() - l % self.teeth.len()) % self.teeth.len()
+    }
+
+    /// Rotation from the passage of the tooth l before to that of this one, at a height (`milling/2.7`).
+    pub fn turned_rad(&self, tooth: usize, l: usize, height_mm: f64) -> f64 {
+        let pitches: f64 = (0..l).map(|k| self.teeth[self.before(tooth, k)].pitch_rad).sum();
+        let lags = self.teeth[tooth].lag_rad_per_mm - self.teeth[self.before(tooth, l)].lag_rad_per_mm;
+        pitches + lags * height_mm
+    }
+
+    /// Of the chip against the tooth l before: what goes with sin phi, and what is always there (`milling/2.2`), mm.
+    pub fn chip_parts(&self, tooth: usize, l: usize, height_mm: f64) -> (f64, f64) {
+        let (sin, cos) = self.edge_angle_rad.sin_cos();
+        let (own, other) = (self.teeth[tooth], self.teeth[self.before(tooth, l)]);
+        let feed_per_turn = self.feed_mm * self.teeth.len() as f64;
+        let fed = feed_per_turn * self.turned_rad(tooth, l, height_mm) / TAU * sin;
+        (fed, (own.radial_mm - other.radial_mm) * sin + (own.axial_mm - other.axial_mm) * cos)
+    }
+
+    /// The chip of a tooth at an angle and a height, and whose surface it meets; `None` where it does not cut.
+    pub fn chip(&self, tooth: usize, angle_rad: f64, height_mm: f64) -> Option<(f64, usize)> {
+        let sin = angle_rad.sin();
+        let against = |l: usize| {
+            let (fed, offset) = self.chip_parts(tooth, l, height_mm);
+            (fed * sin + offset, l)
+        };
+        let last = if self.has_run_out() { self.teeth.len() } else { 1 };
+        (1..=last).map(against).min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(chip, _)| *chip > 0.0)
+    }
+
+    /// Whether any tooth stands out.
+    pub fn has_run_out(&self) -> bool {
+        let first = self.teeth[0];
+        let differs =
+            |t: &Tooth| (t.radial_mm - first.radial_mm).abs() > 0.0 || (t.axial_mm - first.axial_mm).abs() > 0.0;
+        self.teeth.iter().any(differs)
+    }
+
+    /// Whether all edges lag alike.
+    pub fn has_one_helix(&self) -> bool {
+        self.teeth.iter().all(|t| (t.lag_rad_per_mm - self.teeth[0].lag_rad_per_mm).abs() < 1e-15)
+    }
+
+    /// Whether a tooth pitch is a period of the cut.
+    pub fn teeth_are_alike(&self) -> bool {
+        let pitch = TAU / self.teeth.len() as f64;
+        let even = self.teeth.iter().all(|t| (t.pitch_rad - pitch).abs() < 1e-12);
+        even && !self.has_run_out() && self.has_one_helix()
+    }
+
+    /// Rotation in a period of the cut, rad.
+    pub fn period_rad(&self) -> f64 {
+        if self.teeth_are_alike() { TAU / self.teeth.len() as f64 } else { TAU }
+    }
+
+    /// What the force of a mm of edge is multiplied with where it goes with a power of the depth.
+    pub fn depth_factor(&self, depth_mm: f64) -> f64 {
+        if self.depth_exponent > 0.0 && depth_mm > 0.0 { depth_mm.powf(-self.depth_exponent) } else { 1.0 }
+    }
+
+    /// Normal of the edge toward the work.
+    pub fn normal(&self, angle_rad: f64) -> Vector {
+        let ((s, c), (sin, cos)) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
+        [sin * s, sin * c, -cos]
+    }
+
+    /// T q/sin kappa: the force on the tool per mm of height by a force per mm of edge (`milling/2.4`).
+    pub fn on_tool(&self, angle_rad: f64, per_edge: &Vector) -> Vector {
+        let ((s, c), (sin, cos)) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
+        let [t, r, a] = per_edge.map(|q| q / sin);
+        let inward = r * sin + a * cos;
+        [-t * c - inward * s, t * s - inward * c, r * cos - a * sin]
+    }
+
+    /// D: slope of that force over the motion of the tool against the work, N/mm per mm of height (`milling/2.5`).
+    pub fn stiffness(&self, angle_rad: f64, slope: &Vector) -> Tensor {
+        let (force, normal) = (self.on_tool(angle_rad, slope), self.normal(angle_rad));
+        force.map(|f| normal.map(|n| f * n))
+    }
+
+    /// An antiderivative of [`Self::stiffness`] over the angle at one slope.
+    pub fn stiffness_integral(&self, angle_rad: f64, slope: &Vector) -> Tensor {
+        let ((s, c), (sin, cos)) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
+        let [t, r, a] = slope.map(|q| q / sin);
+        let inward = r * sin + a * cos;
+        let lifting = r * cos - a * sin;
+        // Integrals of s^2, c^2, s c, s, c.
+        let (ss, cc, sc) = (0.5 * (angle_rad - s * c), 0.5 * (angle_rad + s * c), 0.5 * s * s);
+        let (is, ic) = (-c, s);
+        [
+            [sin * (-t * sc - inward * ss), sin * (-t * cc - inward * sc), -cos * (-t * ic - inward * is)],
+            [sin * (t * ss - inward * sc), sin * (t * sc - inward * cc), -cos * (t * is - inward * ic)],
+            [sin * lifting * is, sin * lifting * ic, -cos * lifting * angle_rad],
+        ]
+    }
+}

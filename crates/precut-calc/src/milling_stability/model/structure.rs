@@ -1,0 +1,125 @@
+//! What yields: modes of tool and workpiece, each along a direction in space (`milling/3.10`).
+
+use std::f64::consts::TAU;
+
+use crate::num::dde::{Matrix, Propagator, Rule};
+
+use super::cutter::Vector;
+
+/// m x'' in kg mm/s2 over the force in N.
+const MM_PER_S2: f64 = 1000.0;
+
+/// Whose mode it is. Force and counter-force make both enter alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Of the tool in the spindle.
+    Tool,
+    /// Of the workpiece in its fixture.
+    Work,
+}
+
+/// A mode at the cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mode {
+    /// Whose.
+    pub side: Side,
+    /// Direction of length 1.
+    pub direction: Vector,
+    /// Natural frequency, Hz.
+    pub frequency_hz: f64,
+    /// Share of critical damping.
+    pub damping_ratio: f64,
+    /// Modal mass at the cut, kg.
+    pub mass_kg: f64,
+}
+
+impl Mode {
+    /// Natural angular frequency, rad/s.
+    pub fn rad_per_s(&self) -> f64 {
+        TAU * self.frequency_hz
+    }
+
+    /// Modal stiffness at the cut, N/mm.
+    pub fn stiffness_n_per_mm(&self) -> f64 {
+        self.mass_kg * self.rad_per_s().powi(2) / MM_PER_S2
+    }
+
+    /// q' = A q + b F of (x, x'/w).
+    fn system(&self) -> (Matrix<2>, [f64; 2]) {
+        let w = self.rad_per_s();
+        ([[0.0, w], [-w, -2.0 * self.damping_ratio * w]], [0.0, MM_PER_S2 / (self.mass_kg * w)])
+    }
+
+    /// x over a force of 1 N along the mode at the angular frequency, mm/N: real and imaginary part.
+    pub fn receptance(&self, rad_per_s: f64) -> (f64, f64) {
+        let w = self.rad_per_s();
+        let (re, im) = (w * w - rad_per_s * rad_per_s, 2.0 * self.damping_ratio * w * rad_per_s);
+        let factor = MM_PER_S2 / (self.mass_kg * (re * re + im * im));
+        (re * factor, -im * factor)
+    }
+}
+
+/// Tool and workpiece together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    /// Of both sides.
+    pub modes: Vec<Mode>,
+    /// Orthonormal directions that span the motion, one to three.
+    pub basis: Vec<Vector>,
+    /// Directions of the modes in that basis.
+    pub directions: Vec<Vec<f64>>,
+}
+
+impl Structure {
+    /// Of modes with directions of length 1.
+    pub fn new(modes: Vec<Mode>) -> Self {
+        let mut basis: Vec<Vector> = Vec::new();
+        for mode in &modes {
+            let mut rest = mode.direction;
+            for known in &basis {
+                let along = dot(known, &rest);
+                rest = std::array::from_fn(|i| rest[i] - along * known[i]);
+            }
+            let length = dot(&rest, &rest).sqrt();
+            if length > 1e-6 {
+                basis.push(rest.map(|x| x / length));
+            }
+        }
+        let directions = modes.iter().map(|mode| basis.iter().map(|b| dot(b, &mode.direction)).collect()).collect();
+        Self { modes, basis, directions }
+    }
+
+    /// Length of the state.
+    pub fn states(&self) -> usize {
+        2 * self.modes.len()
+    }
+
+    /// The fastest oscillation, rad/s.
+    pub fn fastest_rad_per_s(&self) -> f64 {
+        self.modes.iter().map(Mode::rad_per_s).fold(0.0, f64::max)
+    }
+
+    /// What an element of so many seconds does to each mode.
+    pub(super) fn propagators<const P: usize>(&self, rule: &Rule<P>, length_s: f64) -> Vec<Propagator<2, P>> {
+        let of = |mode: &Mode| {
+            let (a, b) = mode.system();
+            Propagator::new(rule, &a, &b, length_s)
+        };
+        self.modes.iter().map(of).collect()
+    }
+
+    /// The same with the velocities in front.
+    pub(super) fn velocities<const P: usize>(&self, rule: &Rule<P>, length_s: f64) -> Vec<Propagator<2, P>> {
+        let of = |mode: &Mode| {
+            let ([[_, up], [down, damped]], [_, push]) = mode.system();
+            // Of (x', x w): x' itself in mm/s.
+            Propagator::new(rule, &[[damped, down], [up, 0.0]], &[push * mode.rad_per_s(), 0.0], length_s)
+        };
+        self.modes.iter().map(of).collect()
+    }
+}
+
+/// Scalar product.
+pub(super) fn dot(a: &Vector, b: &Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

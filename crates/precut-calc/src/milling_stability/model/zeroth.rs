@@ -1,0 +1,93 @@
+//! The zeroth order: the cutting stiffness replaced by its mean (`milling/4.16`; Altintas, Budak 1995).
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::num::quadrature::gauss_legendre;
+
+use super::cutter::{Milling, Tensor};
+use super::edge::{Edges, combined};
+use super::structure::Structure;
+
+/// Frequencies of the search between two refinements.
+const FREQUENCIES: u32 = 3000;
+/// Gauss points of a smooth stretch of the mean.
+const POINTS: usize = 16;
+/// 1 minus the golden ratio's inverse squared.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// The least depth of all speeds by the mean stiffness, and the frequency of its chatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Zeroth {
+    /// mm. Never a bound: the true limit may lie below.
+    pub depth_mm: f64,
+    /// Hz.
+    pub frequency_hz: f64,
+}
+
+/// W: mean of the cutting stiffness per mm of depth, N/mm2. The helix does not matter for it.
+pub fn mean_stiffness(milling: &Milling) -> Tensor {
+    let straight = Milling {
+        teeth: milling.teeth.iter().map(|t| super::cutter::Tooth { lag_rad_per_mm: 0.0, ..*t }).collect(),
+        depth_exponent: 0.0,
+        ..milling.clone()
+    };
+    let edges = Edges::new(&straight, 1.0);
+    let mut breaks = edges.rotations();
+    let period = straight.period_rad();
+    breaks.extend([0.0, period]);
+    breaks.sort_by(f64::total_cmp);
+    let (points, weights) = gauss_legendre(POINTS);
+    let mut mean = [[0.0; 3]; 3];
+    for pair in breaks.windows(2) {
+        for (c, w) in points.iter().zip(&weights) {
+            let instant = edges.at(pair[0] + c * (pair[1] - pair[0]));
+            for entry in instant.entries {
+                mean = combined(&mean, 1.0, &entry.stiffness, w * (pair[1] - pair[0]) / period);
+            }
+        }
+    }
+    mean
+}
+
+/// The least depth over all speeds; `None` where the mean drives nothing.
+pub fn zeroth(milling: &Milling, structure: &Structure) -> Option<Zeroth> {
+    let mean = mean_stiffness(milling);
+    let d = structure.basis.len();
+    let w = DMatrix::from_fn(d, d, |a, b| {
+        let (left, right) = (structure.basis[a], structure.basis[b]);
+        (0..3).flat_map(|i| (0..3).map(move |j| left[i] * mean[i][j] * right[j])).sum::<f64>()
+    });
+    let low = structure.modes.iter().map(|m| m.frequency_hz).fold(f64::INFINITY, f64::min) * 0.3;
+    let high = structure.modes.iter().map(|m| m.frequency_hz).fold(0.0, f64::max) * 3.0;
+    let at = |step: f64| low * (high / low).powf(step / f64::from(FREQUENCIES));
+    let depth = |hz: f64| largest_real_part(structure, &w, TAU * hz).map(|re| 0.5 / re);
+    let of = |step: f64| depth(at(step)).unwrap_or(f64::INFINITY);
+    let best = (0..=FREQUENCIES).map(f64::from).min_by(|a, b| of(*a).total_cmp(&of(*b)))?;
+    let (mut a, mut b) = (best - 1.0, best + 1.0);
+    for _ in 0..60 {
+        let (p, q) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+        if of(p) < of(q) { b = q } else { a = p }
+    }
+    let linear = depth(at(0.5 * (a + b)))?;
+    let depth_mm = linear.powf(1.0 / (1.0 - milling.depth_exponent));
+    Some(Zeroth { depth_mm, frequency_hz: at(0.5 * (a + b)) })
+}
+
+/// The largest positive real part of an eigenvalue of G W.
+fn largest_real_part(structure: &Structure, w: &DMatrix<f64>, rad_per_s: f64) -> Option<f64> {
+    let d = structure.basis.len();
+    let mut g: DMatrix<Complex<f64>> = DMatrix::zeros(d, d);
+    for (mode, along) in structure.modes.iter().zip(&structure.directions) {
+        let (re, im) = mode.receptance(rad_per_s);
+        for a in 0..d {
+            for b in 0..d {
+                g[(a, b)] += Complex::new(re, im) * (along[a] * along[b]);
+            }
+        }
+    }
+    let product = g * w.map(|x| Complex::new(x, 0.0));
+    let values = product.schur().eigenvalues()?;
+    values.iter().map(|value| value.re).filter(|re| *re > 0.0).max_by(f64::total_cmp)
+}
