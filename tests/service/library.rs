@@ -90,6 +90,7 @@ fn program_by_names() -> Value {
         { "number": tools[1]["number"], "tip_direction": 3, "name": "dnmg150608_pdjnr2525m15", "nose_radius_mm": 0.4 },
     ]);
     job["force"] = json!({ "kind": "kienzle", "normal_force": "judged" });
+    job["mode"] = json!({ "kind": "read" });
     job["stock"].as_object_mut().unwrap().remove("material");
     for support in job["supports"].as_array_mut().unwrap() {
         for number in ["compliance_um_per_n", "rotational_compliance_rad_per_n_mm"] {
