@@ -97,10 +97,10 @@ async fn a_database_of_a_newer_program_or_without_rights_is_refused_and_left_alo
     let Some(database) = Database::start() else { return };
     Member::start(&database, "api", &[]).await.stop();
     let pool = database.pool().await;
-    sqlx::query("INSERT INTO precut.versions VALUES (10, 10)").execute(&pool).await.unwrap();
+    sqlx::query("INSERT INTO precut.versions VALUES (1000, 1000)").execute(&pool).await.unwrap();
     let (code, said) = refused(&database.address, &[], &[]);
     assert!(code == Some(1) && said.contains("newer precut"), "{said}");
-    sqlx::query("DELETE FROM precut.versions WHERE version = 10").execute(&pool).await.unwrap();
+    sqlx::query("DELETE FROM precut.versions WHERE version = 1000").execute(&pool).await.unwrap();
     sqlx::query("ALTER DATABASE postgres SET default_transaction_read_only = on").execute(&pool).await.unwrap();
     let (code, said) = refused(&database.address, &[], &[]);
     assert!(code == Some(1) && said.contains("read-only"), "{said}");

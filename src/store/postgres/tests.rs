@@ -522,11 +522,11 @@ shared! {
     async fn a_newer_schema_is_refused_unless_it_says_that_it_serves_this_program() {
         let place = InDatabase::new().await;
         place.execute("ALTER TABLE precut.jobs ADD COLUMN future text NOT NULL DEFAULT 'later'").await;
-        place.execute("INSERT INTO precut.versions VALUES (11, 1)").await;
+        place.execute("INSERT INTO precut.versions VALUES (1000, 1)").await;
         let beside = place.other().await;
         let id = place.accept(job(1)).await.id;
         assert_eq!(beside.job(id).await.unwrap().unwrap().id, id);
-        place.execute("INSERT INTO precut.versions VALUES (12, 11)").await;
+        place.execute("INSERT INTO precut.versions VALUES (1001, 1000)").await;
         let Err(refused) = PostgresStore::open(&secret(&place.name), usage(place.keep)).await else { panic!("opened") };
         assert!(refused.to_string().contains("newer precut"), "{refused}");
     }
