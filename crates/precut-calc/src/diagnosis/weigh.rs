@@ -51,6 +51,17 @@ const SHARE_OF_LEVEL: f64 = 1e-3;
 /// than everything else.
 const MOST_FREE_SIZES: usize = 200;
 
+/// Of which sets other optima are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OtherOptima {
+    /// Of none.
+    None,
+    /// Of the set that leads.
+    OfLeader,
+    /// Of every single cause, too, and of every set that may yet lead.
+    OfAll,
+}
+
 /// How far the search goes, and how badly a set may fit that is named.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
@@ -70,10 +81,8 @@ pub struct Effort {
     /// Whether the model is far from linear in its sizes: then a refinement takes more steps, and what it changes at
     /// the best point of a grid corrects the whole grid.
     pub nonlinear: bool,
-    /// Whether other optima of the leading set are looked for.
-    pub other_optima: bool,
-    /// Whether those of every single cause are, and of every set that may yet lead.
-    pub elsewhere: bool,
+    /// Of which sets other optima are looked for.
+    pub other_optima: OtherOptima,
     /// Least probability of what a set leaves for it to be named, and of what the base leaves for it to be adequate.
     pub level: f64,
     /// Whether a part of the rows is held back: then of classes, whose test of the base draws thousands, it is not tested.
@@ -94,8 +103,7 @@ impl Effort {
             rounds: 1,
             late_leaders: LATE_LEADERS,
             nonlinear: false,
-            other_optima: true,
-            elsewhere: false,
+            other_optima: OtherOptima::OfLeader,
             level: LEVEL,
             in_fold: false,
         }
@@ -121,8 +129,7 @@ impl Effort {
             rounds: 3,
             late_leaders: 2,
             nonlinear: true,
-            other_optima: true,
-            elsewhere: false,
+            other_optima: OtherOptima::OfLeader,
             level: LEVEL,
             in_fold: false,
         }
@@ -131,7 +138,7 @@ impl Effort {
     /// Where a simulation is short: every single cause is looked for wherever it would be if it were asked for alone. From one
     /// place a second mode was not found that alone has the most evidence.
     pub fn short(most_causes: usize) -> Self {
-        Self { of_each_size: [0, usize::MAX, 3, 1], elsewhere: true, ..Self::dear(most_causes) }
+        Self { of_each_size: [0, usize::MAX, 3, 1], other_optima: OtherOptima::OfAll, ..Self::dear(most_causes) }
     }
 
     /// Where every prediction is a simulation, and that a long one or not; else the whole search.
@@ -153,8 +160,7 @@ impl Effort {
             rounds: 1,
             late_leaders: 1,
             nonlinear: true,
-            other_optima: false,
-            elsewhere: false,
+            other_optima: OtherOptima::None,
             level: LEVEL,
             in_fold: true,
         }
@@ -246,7 +252,7 @@ impl<'a> Weighing<'a> {
         };
         let mut ranking = Ranking::new(candidates);
         ranking.refine(&linear, &refinement, effort.leaders, effort.of_each_size, monitor)?;
-        if effort.elsewhere {
+        if effort.other_optima == OtherOptima::OfAll {
             ranking.look_elsewhere_of(|set, _| set.members.len() == 1, &linear, &refinement, monitor)?;
         }
         for _ in 0..effort.rounds {
@@ -256,11 +262,11 @@ impl<'a> Weighing<'a> {
             ranking.refine_beside_sizeless(&linear, &refinement, monitor)?;
         }
         ranking.refine_parts(&linear, &refinement, monitor)?;
-        if effort.elsewhere {
+        if effort.other_optima == OtherOptima::OfAll {
             let is_near = |set: &Candidate, leads: f64| set.members.len() > 1 && set.log_z > leads - NEAR;
             ranking.look_elsewhere_of(is_near, &linear, &refinement, monitor)?;
         }
-        if effort.other_optima {
+        if effort.other_optima != OtherOptima::None {
             ranking.look_elsewhere(&linear, &refinement)?;
         }
         let kinds = discrepancy::kinds(data, &linear.likelihood, noise.sigma, foundation.unnamed.as_deref(), monitor)?;

@@ -16,7 +16,7 @@
 //! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
 //!
 //! The state is a function of the document and of the parts in the order of their numbers, and of nothing else. It holds no
-//! more than the last [`onsets::WINDOW`] parts; older ones live on in the sums of `null`.
+//! more than the last parts, as many as onsets are looked for in; older ones live on in the sums of `null`.
 
 mod action;
 mod check;

@@ -302,7 +302,9 @@ impl YieldedWork {
             }
         }
         let mut contour = ErrorAlong::default();
-        errors.iter().for_each(|error| contour.push(error));
+        for error in &errors {
+            contour.push(error);
+        }
         let mut cuts = CutsAlong::default();
         let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.contains(&line);
         yielded.places.iter().filter(|of| is_told(of.line)).for_each(|of| cuts.push(of.line, &of.place));

@@ -233,7 +233,9 @@ mod tests {
     #[test]
     fn air_is_crossed_without_a_knot() {
         let mut points = curve(500, 0.01, |x| if x < 2.0 { -1.0 } else { -0.02 });
-        points.iter_mut().for_each(|wanted| wanted.cuts = wanted.at >= 2.0);
+        for wanted in &mut points {
+            wanted.cuts = wanted.at >= 2.0;
+        }
         let knots = chords(&points, 0.0, None, LIMITS);
         assert_eq!(knots.len(), 3, "{knots:?}");
     }

@@ -16,7 +16,7 @@ const SAME_MM: f64 = 1e-6;
 pub(crate) struct Off {
     pub(crate) z_mm: f64,
     /// On the radius: above 0 the work is thick.
-    pub(crate) off_mm: f64,
+    pub(crate) by_mm: f64,
     /// Line that makes the outline there, in the program whose it should be.
     pub(crate) line: Option<usize>,
 }
@@ -55,7 +55,7 @@ pub(super) fn differences(wanted: &[Part], real: &[Part]) -> Vec<Off> {
             if slope.abs() <= STEEPEST {
                 found.push(Off {
                     z_mm,
-                    off_mm: is.piece.curve.at(z_mm) - should.piece.curve.at(z_mm),
+                    by_mm: is.piece.curve.at(z_mm) - should.piece.curve.at(z_mm),
                     line: should.owner,
                 });
             }

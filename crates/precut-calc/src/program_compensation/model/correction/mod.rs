@@ -147,8 +147,8 @@ fn undersize(wanted: &[Part], planned: &[Part], changed: &[ChangedLine]) -> Vec<
     let mut found: BTreeMap<usize, Undersize> = BTreeMap::new();
     for off in compare::differences(wanted, planned) {
         let line = off.line.filter(|line| changed.binary_search_by_key(line, |one| one.line).is_ok());
-        if let Some(line) = line.filter(|_| off.off_mm < -UNDERSIZE_MM) {
-            let one = Undersize { line, z_mm: off.z_mm, error_um: 2e3 * off.off_mm };
+        if let Some(line) = line.filter(|_| off.by_mm < -UNDERSIZE_MM) {
+            let one = Undersize { line, z_mm: off.z_mm, error_um: 2e3 * off.by_mm };
             let worst = found.entry(line).or_insert(one);
             if one.error_um < worst.error_um {
                 *worst = one;

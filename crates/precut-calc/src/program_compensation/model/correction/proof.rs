@@ -95,8 +95,8 @@ impl From<Failed> for Failure {
                     .with("off_um", off_um),
             ),
             Failed::Thin(places) => {
-                let worst = places.iter().copied().min_by(|a, b| a.off_mm.total_cmp(&b.off_mm));
-                let (line, off_mm) = worst.map_or((1, 0.0), |off| (off.line.unwrap_or(1), off.off_mm));
+                let worst = places.iter().copied().min_by(|a, b| a.by_mm.total_cmp(&b.by_mm));
+                let (line, off_mm) = worst.map_or((1, 0.0), |off| (off.line.unwrap_or(1), off.by_mm));
                 Failed::Part { part: "contour", line, off_um: UM_PER_MM * off_mm }.into()
             }
         }
@@ -147,7 +147,7 @@ pub(crate) fn proved(
         let counted = errors.iter().filter(is_counted).map(|error| error.error_um);
         counted.fold([0.0_f64, 0.0_f64], |[low, high], error| [low.min(error), high.max(error)])
     };
-    let nearest = |yielded: &Yielded| yielded.rapids.iter().map(|one| one.clearance_mm).reduce(f64::min);
+    let nearest = |yielded: &Yielded| yielded.rapids.iter().map(|one| one.gap_mm).reduce(f64::min);
     Ok(Proof {
         before_um: ends(&contour(task.before)),
         after_um: ends(&errors),
@@ -163,14 +163,14 @@ pub(crate) fn proved(
 
 /// No rapid move comes nearer to the work than before, but for those that keep well off.
 fn keep_off(before: &Yielded, after: &Yielded, (of, program): (&[usize], &Program), by_mm: f64) -> Result<(), Failed> {
-    let old: BTreeMap<usize, f64> = before.rapids.iter().map(|one| (one.mv, one.clearance_mm)).collect();
+    let old: BTreeMap<usize, f64> = before.rapids.iter().map(|one| (one.mv, one.gap_mm)).collect();
     for one in &after.rapids {
         let Some(&mv) = of.get(one.mv) else { continue };
         let was = old.get(&mv).copied().unwrap_or(f64::INFINITY);
         // One that begins where a cut ended stands in the work that comes back: rigid work says what is to be said of it.
-        if was > 0.0 && one.clearance_mm < was.min(KEEP_OFF_MM) - by_mm {
+        if was > 0.0 && one.gap_mm < was.min(KEEP_OFF_MM) - by_mm {
             let line = program.moves.get(mv).map_or(1, |one| one.line);
-            return Err(Failed::Part { part: "rapid", line, off_um: UM_PER_MM * (was - one.clearance_mm) });
+            return Err(Failed::Part { part: "rapid", line, off_um: UM_PER_MM * (was - one.gap_mm) });
         }
     }
     Ok(())
@@ -188,7 +188,7 @@ fn outlines(planned: &[Part], real: &[Part], jumps: &[Jump], residual_mm: f64) -
     let mut compared = Compared { residual_um: 0.0, residual_at_mm: 0.0, transitions: Vec::new() };
     let (mut thin, mut before_mm, mut is_open): (Vec<Off>, f64, bool) = (Vec::new(), f64::NEG_INFINITY, false);
     for off in differences(planned, real) {
-        let Off { z_mm, off_mm, line } = off;
+        let Off { z_mm, by_mm: off_mm, line } = off;
         let off_um = UM_PER_MM * off_mm;
         let jump = jumps.iter().find(|jump| (jump.from_mm..=jump.to_mm).contains(&z_mm));
         let is_thick = off_mm > residual_mm;

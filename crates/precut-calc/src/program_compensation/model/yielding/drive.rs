@@ -78,7 +78,7 @@ pub(crate) struct Clearance {
     pub(crate) line: usize,
     pub(crate) mv: usize,
     /// Below 0 it goes through it, mm.
-    pub(crate) clearance_mm: f64,
+    pub(crate) gap_mm: f64,
 }
 
 /// The work as the section of the beam has it: before and after a move of the program that is meant.
@@ -145,9 +145,9 @@ pub(crate) fn yielding(
     for stroke in strokes(program, job, zero) {
         let Stroke { one, shape, way, .. } = &stroke;
         if one.kind == Kind::Rapid {
-            let clearance_mm = -real.depth_of(shape, way);
-            if clearance_mm < NEAR_MM {
-                yielded.rapids.push(Clearance { line: one.line, mv: stroke.index, clearance_mm });
+            let gap_mm = -real.depth_of(shape, way);
+            if gap_mm < NEAR_MM {
+                yielded.rapids.push(Clearance { line: one.line, mv: stroke.index, gap_mm });
             }
         }
         if !one.kind.is_feed() {
