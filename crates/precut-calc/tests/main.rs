@@ -58,6 +58,7 @@ mod feed_properties;
 mod feed_reference;
 mod feed_risk;
 mod feed_support;
+mod fixture_certainty;
 mod fixture_class_trials;
 mod fixture_classes;
 mod fixture_diagnosis;

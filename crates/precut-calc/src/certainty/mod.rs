@@ -7,14 +7,26 @@
 mod answer;
 mod distribution;
 pub(crate) mod lines;
+mod quantities;
 mod scores;
 mod surface;
 
 pub use answer::{Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};
+pub(crate) use quantities::{
+    CODES as QUANTITY_CODES, Pair, Quantity, Uncertain, Uncertainties, check_correlations, check_quantities,
+};
 pub(crate) use scores::{Contradiction, Scores};
 pub(crate) use surface::Surface;
+
+/// A probability is told between these.
+const LEAST: f64 = 1e-6;
+
+/// A probability as it is told: never 0 or 1.
+pub(crate) fn bounded(probability: f64) -> f64 {
+    probability.clamp(LEAST, 1.0 - LEAST)
+}
 
 /// Probability that a standard normal number is below `x`.
 pub(crate) fn normal_below(x: f64) -> f64 {

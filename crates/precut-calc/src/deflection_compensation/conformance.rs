@@ -3,14 +3,14 @@
 use crate::calculator::{Failure, Finding, Message, Monitor, checkpoint};
 use crate::certainty::lines::{Effort, Estimate, Found, Margins, Question, Sketch, Together, points};
 use crate::certainty::{
-    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts, Surface,
-    normal_below,
+    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, Quantity, SeveralParts,
+    Surface, Uncertainties, bounded, normal_below,
 };
 
 use super::input::{Aim, Job, SizeLimits};
 use super::output::ErrorFan;
 use super::rehearsal::Rehearsal;
-use super::uncertain::Uncertainties;
+use super::uncertain::{DeflectionQuantity, draw_of, uncertainties};
 
 /// Upper and lower limit of size, and form.
 const LIMITS: usize = 3;
@@ -21,8 +21,6 @@ const FORM: usize = 2;
 const SETS: [Together; 5] = [ABOVE..=ABOVE, BELOW..=BELOW, FORM..=FORM, ABOVE..=BELOW, ABOVE..=FORM];
 const SIZE: usize = 3;
 const JOINT: usize = 4;
-/// A probability is told between these.
-const LEAST: f64 = 1e-6;
 /// Most lines of one scrambling: for a probability, for what something else would make of it on the same lines, and for what a
 /// measured part would make of it.
 const MOST_LINES: [usize; 3] = [128, 8, 32];
@@ -45,7 +43,7 @@ pub(super) const WARNING_CODES: &[&str] = &["improbable"];
 pub(super) struct Judged<'a> {
     job: &'a Job,
     rehearsal: &'a Rehearsal<'a>,
-    uncertainties: Uncertainties,
+    uncertainties: Uncertainties<DeflectionQuantity>,
     limits: SizeLimits,
     near: Near,
     /// Independent scores along which what decides changes fastest.
@@ -71,7 +69,11 @@ struct Near {
 }
 
 impl Near {
-    fn of(rehearsal: &Rehearsal<'_>, uncertainties: &Uncertainties, shift_step_um: f64) -> Result<Self, Failure> {
+    fn of(
+        rehearsal: &Rehearsal<'_>,
+        uncertainties: &Uncertainties<DeflectionQuantity>,
+        shift_step_um: f64,
+    ) -> Result<Self, Failure> {
         let mut scales = uncertainties.scales();
         scales.push((0.0, shift_step_um));
         let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
@@ -79,7 +81,7 @@ impl Near {
         let surface = Surface::of(&acts, &mut |x| {
             let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
             let values: Vec<f64> = (0..count).map(at).collect();
-            rehearsal.errors_um(&uncertainties.draw_of(&values), at(count))
+            rehearsal.errors_um(&draw_of(uncertainties, &values), at(count))
         })?;
         Ok(Self { surface, scales })
     }
@@ -106,7 +108,7 @@ impl<'a> Judged<'a> {
         rehearsal: &'a Rehearsal<'a>,
         monitor: &'a dyn Monitor,
     ) -> Result<Option<Self>, Failure> {
-        let uncertainties = Uncertainties::of(job)
+        let uncertainties = uncertainties(job)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
         if uncertainties.of.is_empty() || rehearsal.z_mm().is_empty() {
             return Ok(None);
@@ -139,10 +141,16 @@ impl<'a> Judged<'a> {
     }
 
     /// Errors by station of a part that is cut as independent scores come to.
-    fn errors_um(&self, by: By, of: &Uncertainties, independent: &[f64], shift_um: f64) -> Result<Vec<f64>, Failure> {
+    fn errors_um(
+        &self,
+        by: By,
+        of: &Uncertainties<DeflectionQuantity>,
+        independent: &[f64],
+        shift_um: f64,
+    ) -> Result<Vec<f64>, Failure> {
         let values = of.values(independent);
         match by {
-            By::Rehearsal => self.rehearsal.errors_um(&of.draw_of(&values), shift_um),
+            By::Rehearsal => self.rehearsal.errors_um(&draw_of(of, &values), shift_um),
             By::Surface => Ok(self.near.surface.at(&self.near.coordinates(&values, shift_um))),
         }
     }
@@ -162,7 +170,13 @@ impl<'a> Judged<'a> {
     }
 
     /// Margins of a part that is cut; of one that cannot be cut none is kept.
-    fn cut(&self, by: By, of: &Uncertainties, independent: &[f64], shift_um: f64) -> Result<Margins<LIMITS>, Failure> {
+    fn cut(
+        &self,
+        by: By,
+        of: &Uncertainties<DeflectionQuantity>,
+        independent: &[f64],
+        shift_um: f64,
+    ) -> Result<Margins<LIMITS>, Failure> {
         match self.errors_um(by, of, independent, shift_um) {
             Ok(errors_um) => Ok(self.margins(self.rehearsal.extremes_um(&errors_um))),
             Err(Failure::OutOfModel(_)) => Ok([f64::NEG_INFINITY; LIMITS]),
@@ -185,7 +199,7 @@ impl<'a> Judged<'a> {
     }
 
     /// The probabilities by the response surface alone, on few lines: for comparisons on the same ones.
-    fn nearly(&self, of: &Uncertainties, shift_um: f64) -> Result<[f64; SETS.len()], Failure> {
+    fn nearly(&self, of: &Uncertainties<DeflectionQuantity>, shift_um: f64) -> Result<[f64; SETS.len()], Failure> {
         let question = self.question(&self.axis, MOST_LINES[1]);
         let found = question.of(&mut |g: &[f64]| self.cut(By::Surface, of, g, shift_um))?;
         Ok(found.of.map(|one| one.probability))
@@ -331,7 +345,7 @@ impl<'a> Judged<'a> {
         let joint = found.of[JOINT];
         // What something else makes of it is compared on the same lines.
         let now = self.nearly(&self.uncertainties, shift_um)?[JOINT];
-        let told = |of: &Uncertainties| -> Result<f64, Failure> {
+        let told = |of: &Uncertainties<DeflectionQuantity>| -> Result<f64, Failure> {
             Ok(bounded(joint.probability + self.nearly(of, shift_um)?[JOINT] - now))
         };
         let mut advice: Vec<Improvement> = Vec::new();
@@ -542,11 +556,6 @@ fn quantile(ascending: &[f64], share: f64) -> f64 {
     let before = place as usize;
     let after = (before + 1).min(last);
     ascending[before] + (place - before as f64) * (ascending[after] - ascending[before])
-}
-
-/// A probability as it is told: never 0 or 1.
-fn bounded(probability: f64) -> f64 {
-    probability.clamp(LEAST, 1.0 - LEAST)
 }
 
 /// Probability that all of several parts are good whose margin is normal, with this share of its variance common to all and

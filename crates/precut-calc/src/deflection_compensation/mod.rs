@@ -381,6 +381,7 @@ const CODES: Codes = Codes {
         check::EFFECT_CODES,
         uncertain::CODES,
         certainty::DISTRIBUTION_CODES,
+        certainty::QUANTITY_CODES,
         crate::shaft::check::CODES,
         force::FAULT_CODES,
     ],

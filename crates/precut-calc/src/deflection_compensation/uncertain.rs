@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Finding, Violations};
-use crate::certainty::{Contradiction, Distribution, Level, Scores, Source, WidthUnit};
+use crate::certainty::{
+    Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
+    check_correlations, check_quantities,
+};
 use crate::effects::DeflectionEffect;
 
 use super::input::{Job, Uncertainty};
@@ -17,8 +20,7 @@ const TOOL_SETTING_UM: f64 = 2.0;
 const LARGEST_NORMAL_PERCENT: f64 = 25.0;
 
 /// Codes of the faults found here.
-pub(super) const CODES: &[&str] =
-    &["duplicate_quantity", "bad_correlation", "correlations_contradict", "tolerance_given_twice", "limits_crossed"];
+pub(super) const CODES: &[&str] = &["tolerance_given_twice", "limits_crossed"];
 
 /// A quantity that is not known exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -48,9 +50,8 @@ pub enum DeflectionQuantity {
     SpindleScatter,
 }
 
-impl DeflectionQuantity {
-    /// Its name, as in the contract.
-    pub(super) fn name(self) -> &'static str {
+impl Quantity for DeflectionQuantity {
+    fn name(self) -> &'static str {
         match self {
             Self::Force => "force",
             Self::Stiffness => "stiffness",
@@ -72,7 +73,9 @@ impl DeflectionQuantity {
             _ => WidthUnit::Percent,
         }
     }
+}
 
+impl DeflectionQuantity {
     fn usual_level(self) -> Level {
         match self {
             Self::StockDiameter | Self::SpindleScatter => Level::Part,
@@ -137,87 +140,42 @@ pub struct DeflectionCorrelation {
     pub coefficient: f64,
 }
 
-/// A quantity with all that is known of it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Uncertain {
-    pub quantity: DeflectionQuantity,
-    pub distribution: Distribution,
-    pub level: Level,
-    pub source: Source,
+/// All quantities of a checked job that are uncertain, and how they go together.
+pub(super) fn uncertainties(job: &Job) -> Result<Uncertainties<DeflectionQuantity>, Contradiction> {
+    let stated = &job.uncertainty;
+    let mut of: Vec<Uncertain<DeflectionQuantity>> = stated
+        .quantities
+        .iter()
+        .map(|one| Uncertain {
+            quantity: one.quantity,
+            distribution: one.distribution.clone(),
+            level: one.level.unwrap_or(one.quantity.usual_level()),
+            source: Source::Stated,
+        })
+        .collect();
+    for usual in usual(job) {
+        let is_stated = of.iter().any(|one| {
+            one.quantity == usual.quantity
+                || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
+        });
+        if !is_stated && (stated.defaults || usual.source == Source::Stated) {
+            of.push(usual);
+        }
+    }
+    Uncertainties::new(of, pairs(stated))
 }
 
-/// All quantities of a job that are uncertain, and how they go together.
-#[derive(Debug, Clone)]
-pub(super) struct Uncertainties {
-    pub of: Vec<Uncertain>,
-    pub scores: Scores,
+fn pairs(stated: &Uncertainty) -> Vec<Pair<'_, DeflectionQuantity>> {
+    stated.correlations.iter().map(|pair| (&pair.between[..], pair.coefficient)).collect()
 }
 
-impl Uncertainties {
-    /// Of a checked job.
-    pub(super) fn of(job: &Job) -> Result<Self, Contradiction> {
-        let stated = &job.uncertainty;
-        let mut of: Vec<Uncertain> = stated
-            .quantities
-            .iter()
-            .map(|one| Uncertain {
-                quantity: one.quantity,
-                distribution: one.distribution.clone(),
-                level: one.level.unwrap_or(one.quantity.usual_level()),
-                source: Source::Stated,
-            })
-            .collect();
-        for usual in usual(job) {
-            let is_stated = of.iter().any(|one| {
-                one.quantity == usual.quantity
-                    || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
-            });
-            if !is_stated && (stated.defaults || usual.source == Source::Stated) {
-                of.push(usual);
-            }
-        }
-        let place = |quantity| of.iter().position(|one: &Uncertain| one.quantity == quantity);
-        let pairs: Vec<(usize, usize, f64)> = stated
-            .correlations
-            .iter()
-            .filter_map(|pair| match pair.between[..] {
-                [one, other] => Some((place(one)?, place(other)?, pair.coefficient)),
-                _ => None,
-            })
-            .collect();
-        let scores = Scores::new(of.len(), &pairs)?;
-        Ok(Self { of, scores })
+/// What is cut with where the quantities come to this.
+pub(super) fn draw_of(of: &Uncertainties<DeflectionQuantity>, values: &[f64]) -> Draw {
+    let mut draw = Draw::STATED;
+    for (one, value) in of.of.iter().zip(values) {
+        one.quantity.put(*value, &mut draw);
     }
-
-    /// What every quantity comes to at independent scores: factors, and additions in um.
-    pub(super) fn values(&self, independent: &[f64]) -> Vec<f64> {
-        self.of.iter().zip(self.scores.of(independent)).map(|(one, score)| one.distribution.at(score)).collect()
-    }
-
-    /// What is cut with where the quantities come to this.
-    pub(super) fn draw_of(&self, values: &[f64]) -> Draw {
-        let mut draw = Draw::STATED;
-        for (one, value) in self.of.iter().zip(values) {
-            one.quantity.put(*value, &mut draw);
-        }
-        draw
-    }
-
-    /// Of every quantity what it comes to at its median, and half of what lies between scores of -1 and 1.
-    pub(super) fn scales(&self) -> Vec<(f64, f64)> {
-        let of = |one: &Uncertain| {
-            let at = |score: f64| one.distribution.at(score);
-            (at(0.0), 0.5 * (at(1.0) - at(-1.0)))
-        };
-        self.of.iter().map(of).collect()
-    }
-
-    /// The same with half of the width of one of them.
-    pub(super) fn halved(&self, index: usize) -> Self {
-        let mut halved = self.clone();
-        halved.of[index].distribution = halved.of[index].distribution.halved();
-        halved
-    }
+    draw
 }
 
 impl Uncertainty {
@@ -232,7 +190,7 @@ impl Uncertainty {
 }
 
 /// What is uncertain in every job, as far as it is not stated otherwise.
-fn usual(job: &Job) -> Vec<Uncertain> {
+fn usual(job: &Job) -> Vec<Uncertain<DeflectionQuantity>> {
     let Uncertainty { force_percent, stiffness_percent, .. } = job.uncertainty;
     let usual = Uncertainty::default();
     let source = |percent: f64, usual: f64| {
@@ -279,31 +237,9 @@ fn usual(job: &Job) -> Vec<Uncertain> {
 pub(super) fn check(job: &Job, violations: &mut Violations) {
     check_limits(job, violations);
     let stated = &job.uncertainty;
-    for (i, one) in stated.quantities.iter().enumerate() {
-        let at = |field: &str| format!("/uncertainty/quantities/{i}{field}");
-        one.distribution.check(one.quantity.unit(), &at("/distribution"), violations);
-        violations.require(stated.quantities[..i].iter().all(|before| before.quantity != one.quantity), || {
-            Finding::new("duplicate_quantity", at("/quantity")).with("quantity", one.quantity.name())
-        });
-    }
-    let mut are_pairs = true;
-    for (i, pair) in stated.correlations.iter().enumerate() {
-        let [one, other] = pair.between[..] else { continue };
-        let same =
-            |before: &DeflectionCorrelation| before.between[..] == [one, other] || before.between[..] == [other, one];
-        let is_pair = one != other && !stated.correlations[..i].iter().any(same);
-        are_pairs &= is_pair;
-        violations.require(is_pair, || {
-            Finding::new("bad_correlation", format!("/uncertainty/correlations/{i}/between"))
-                .with("one", one.name())
-                .with("other", other.name())
-        });
-    }
-    if are_pairs && let Err(Contradiction { largest_factor }) = Uncertainties::of(job) {
-        violations.add(
-            Finding::new("correlations_contradict", "/uncertainty/correlations").with("largest_factor", largest_factor),
-        );
-    }
+    let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
+    check_quantities(&quantities, violations);
+    check_correlations(&pairs(stated), || uncertainties(job).err(), violations);
 }
 
 fn check_limits(job: &Job, violations: &mut Violations) {

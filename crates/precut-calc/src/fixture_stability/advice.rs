@@ -3,9 +3,11 @@
 use crate::calculator::{Finding, Message};
 
 use super::answer::{Aside, NEAR_LIMIT, Settling, Study};
-use super::input::{Friction, Spindle};
+use super::conformance;
+use super::input::{Analysis, Friction, Spindle};
 use super::output::{ChatterKind, ClampForce, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
 use super::plausible::implausible;
+use super::probable_depths;
 use super::simulate::Steady;
 
 /// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
@@ -177,6 +179,7 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
             "1",
         ));
     }
+    found.extend(outcome.conformance.as_ref().and_then(conformance::warnings));
     found
 }
 
@@ -269,6 +272,12 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
             .with("spindle_speed_rpm", study.case.working.spindle_rpm),
         None => Message::new("no_chatter_limit").with("depth_mm", study.examined_mm),
     });
+    if let Some(conformance) = &outcome.conformance {
+        said.extend(conformance::said(conformance));
+        let asked = study.job.asks(Analysis::Certainty);
+        let depths = outcome.probable_depths.as_ref();
+        said.extend(asked.then(|| probable_depths::said_of(depths, conformance.joint.wanted)).flatten());
+    }
     said.extend(of_spindle(outcome));
     if let Some(lobes) = &outcome.lobes {
         if let Some(better) = lobes.better_speeds.first() {

@@ -8,6 +8,8 @@ use crate::calculator::{Failure, Message, Monitor, checkpoint};
 
 use super::acting::Case;
 use super::clamp::clamp_force;
+use super::conformance::{FixtureConformance, Judged};
+use super::cost::tells_probability;
 use super::drive::{self, DriveDepths};
 use super::floquet::{Multiplier, Working};
 use super::holding::Closed;
@@ -21,6 +23,7 @@ use super::output::{
 };
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
+use super::probable_depths::{ProbableDepths, probable_depths};
 use super::response::{Response, response, span_mm, unbroken};
 use super::simulate::{Observed, Steady, count, observed, plan, run, scatter, small};
 use super::speeds::{ForcedLimits, better_speeds, first_of, forced_limits};
@@ -221,6 +224,7 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
         None
     };
     let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
+    let (conformance, probable_depths) = certainty(study)?;
     let history = keep.then(|| histories(study, &cut.run));
     let zeroth_order = zeroth_order(study);
     let drive = cutting_drive(study);
@@ -249,8 +253,24 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
         limits,
         lobes,
         history,
+        conformance,
+        probable_depths,
     };
     Ok((outcome, aside))
+}
+
+/// How probable it is that the cut stays quiet, and how deep one may cut with the wanted probability where that is asked.
+fn certainty(study: &Study<'_>) -> Result<(Option<FixtureConformance>, Option<ProbableDepths>), Failure> {
+    let Study { job, case, monitor, .. } = study;
+    let asked = job.asks(Analysis::Certainty);
+    if !asked && !tells_probability(case) {
+        return Ok((None, None));
+    }
+    let Some(judged) = Judged::of(job, case, &study.rules, *monitor)? else { return Ok((None, None)) };
+    monitor.progress(0.9, Message::new("stage_certainty"));
+    let conformance = judged.conformance(asked.then_some(study.examined_mm))?;
+    let depths = if asked { probable_depths(study, &judged)? } else { None };
+    Ok((Some(conformance), depths))
 }
 
 fn engagement(study: &Study<'_>) -> Engagement {

@@ -6,6 +6,7 @@ use crate::effects::FixtureEffect as Effect;
 use super::acting::Case;
 use super::cutting::engagement_rad;
 use super::input::{FixtureJob, Friction, MAX_MAP_POINTS, Vise};
+use super::uncertain;
 
 /// Codes of the faults found here, and those that fields name for their range.
 pub(super) const CODES: &[&str] = &[
@@ -44,6 +45,7 @@ impl Check for FixtureJob {
         check_lobes(self, violations);
         check_simulation(self, violations);
         check_effects(self, violations);
+        uncertain::check(self, violations);
     }
 }
 

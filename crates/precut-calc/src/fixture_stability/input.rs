@@ -8,6 +8,8 @@ use utoipa::{PartialSchema, ToSchema};
 use crate::effects::{FixtureConditions, FixtureEffect};
 use crate::force::choice;
 
+use super::uncertain::FixtureUncertainty;
+
 /// Most points of a lobe map.
 pub const MAX_MAP_POINTS: u64 = 1_000_000;
 
@@ -34,12 +36,16 @@ pub struct FixtureJob {
     pub spindle: Option<Spindle>,
     /// What is asked beside the verdict.
     #[serde(default = "only_verdict")]
-    #[schema(max_items = 5, default = json!(["verdict"]), example = json!(["verdict", "clamp_force", "lobes"]), extensions(("x-group" = json!("numerics"))))]
+    #[schema(max_items = 6, default = json!(["verdict"]), example = json!(["verdict", "clamp_force", "lobes"]), extensions(("x-group" = json!("numerics"))))]
     pub analyses: Vec<Analysis>,
     /// The plane of the lobe diagram; what it leaves out is chosen around the working point.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("numerics"))))]
     pub lobes: LobeSettings,
+    /// What is uncertain in it, and which probability is wanted.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub uncertainty: FixtureUncertainty,
     /// How far depths are looked at for limits.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
@@ -342,6 +348,8 @@ pub enum Analysis {
     History,
     /// Depths at which something gives out, and the amplitude over the depth.
     Limits,
+    /// How deep one may cut with the wanted probability, at this speed and at others.
+    Certainty,
 }
 
 /// The plane of the lobe diagram.

@@ -15,7 +15,9 @@ mod answer;
 mod answering;
 mod check;
 mod clamp;
+mod conformance;
 mod consequence;
+mod cost;
 mod cutting;
 mod drive;
 mod floquet;
@@ -34,13 +36,16 @@ mod parts;
 mod picture;
 mod plausible;
 mod predict;
+mod probable_depths;
 mod response;
 mod settled;
 mod simulate;
 mod slip;
 mod speeds;
+mod uncertain;
 mod zeroth;
 
+pub use conformance::FixtureConformance;
 pub use forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
 pub use input::{
     Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, Friction, JawGrip, LimitSettings, LimitSpeed,
@@ -55,12 +60,17 @@ pub use output::{
     TextbookForce, VibrationMode, ZerothOrder,
 };
 
+pub use probable_depths::{ProbableDepths, RobustSpeed};
+pub use uncertain::{FixtureCorrelation, FixtureQuantity, FixtureUncertainQuantity, FixtureUncertainty};
+
 pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
     Place, Table, checkpoint,
 };
+
+use crate::certainty::{DISTRIBUTION_CODES, QUANTITY_CODES};
 
 use acting::Case;
 use answer::{Study, outcome};
@@ -76,7 +86,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \
@@ -123,6 +133,7 @@ impl Calculator for FixtureStability {
             "/chatter_depth_mm",
             "/verdict/peak_to_peak_um",
             "/forced/clamp_fixed_n",
+            "/conformance/joint/probability",
             "/multiplier/modulus",
         ],
         codes: CODES,
@@ -145,7 +156,7 @@ impl Calculator for FixtureStability {
     }
 
     fn cost(job: &FixtureJob) -> Cost {
-        cost(job)
+        cost::cost(job)
     }
 
     fn run(job: &FixtureJob, monitor: &dyn Monitor) -> Result<Answer<FixtureOutcome>, Failure> {
@@ -170,80 +181,6 @@ impl Calculator for FixtureStability {
     fn at_place(job: &FixtureJob, _outcome: &FixtureOutcome, place: &Place<'_>) -> Option<FixtureJob> {
         picture::at_place(job, place)
     }
-}
-
-/// Oscillations in a tooth period from which on one Krylov space does not suffice for most multipliers, how their time then grows
-/// with them, and how much it is at most: that of all restarts. Measured with 20 to 540 oscillations.
-const ONE_SPACE: f64 = 120.0;
-const RESTARTS_GROW: f64 = 3.5;
-const ALL_RESTARTS: f64 = 300.0;
-/// Of uneven teeth: a forced motion per tooth squared and 50 points of the history of a multiplier, ms. Measured with 8 to 120
-/// teeth.
-const UNEVEN_MS: f64 = 0.4 / 50.0;
-/// Bytes that a multiplier holds per point of its history: the vectors of its space, and what the map is made of.
-const POINT_BYTES: f64 = 700.0;
-/// Bytes of a piece of the forced motion, of a kept step, and of a place of the arc.
-const PIECE_BYTES: f64 = 250.0;
-const STEP_BYTES: f64 = 100.0;
-const PLACE_BYTES: f64 = 24.0;
-
-/// Expected work. A multiplier costs about 1 us per point of its history and 10 us besides, some hundred times as much where the
-/// cutter turns so slowly that hundreds of oscillations go into a tooth period; a step in time 12 ns (a plain vise, linear law) to
-/// 60 ns (joints that open, a power of the chip, kept steps), the most is taken, and 25 ns for every further tooth in cut.
-fn cost(job: &FixtureJob) -> Cost {
-    let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
-    let highest = case.holding.modes().last().map_or(0.0, |mode| mode.natural_hz);
-    let oscillations = |spindle_rpm: f64| highest * case.cutting.tooth_period_s(spindle_rpm);
-    let history = |spindle_rpm: f64| 24.0 + 14.0 * oscillations(spindle_rpm);
-    let restarted = |spindle_rpm: f64| (oscillations(spindle_rpm) / ONE_SPACE).powf(RESTARTS_GROW);
-    let states = case.holding.states() as f64;
-    let phases = case.cutting.phases() as f64;
-    let of_phases = 0.7 + 0.3 * phases;
-    let point_ms = |n: f64| {
-        let per_point = 0.0006 * of_phases * restarted(n).clamp(1.0, ALL_RESTARTS);
-        (0.008 + per_point * history(n)) * (0.5 + 0.25 * states)
-    };
-    let working = case.working.spindle_rpm;
-    let steps =
-        job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
-    let teeth = case.cutting.stretches().iter().map(|stretch| stretch.teeth).max().unwrap_or(0) as f64;
-    let step_ms = 6e-5 + 2.5e-5 * (teeth - 2.0).max(0.0);
-    let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * step_ms;
-    // A better speed is tried before it is named.
-    let more = [Analysis::ClampForce, Analysis::Lobes].into_iter().filter(|of| job.asks(*of)).count();
-    let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + more as f64;
-    let mut parts =
-        vec![(2.0 + 100.0 * point_ms(working), "/cut/spindle_speed_rpm"), (runs * run_ms, "/simulation/tooth_periods")];
-    if case.cutting.uneven() {
-        parts.push((UNEVEN_MS * phases * phases * history(working), "/cutter/teeth"));
-    }
-    if job.asks(Analysis::Limits) {
-        parts.push((0.6 * f64::from(job.limits.depths) * run_ms, "/limits/depths"));
-    }
-    let kept = if job.asks(Analysis::History) { 2.0 * case.cutting.teeth.clamp(4, 40) as f64 } else { 0.0 };
-    let pieces = phases * (240.0 + 48.0 * oscillations(working));
-    let held = POINT_BYTES * phases.sqrt() * history(working)
-        + PIECE_BYTES * pieces
-        + steps * (STEP_BYTES * kept + PLACE_BYTES * (1.0 + teeth));
-    // Of what no number of bytes holds the most.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let mut bytes = 400_000_u64.saturating_add(held as u64);
-    if job.asks(Analysis::Lobes) {
-        let from = job.lobes.from_rpm.unwrap_or(0.5 * working);
-        let to = job.lobes.to_rpm.unwrap_or(2.0 * working).max(from);
-        // Slow speeds have long histories: the mean of 1/n over the range.
-        let mean = if to > from { (to - from) / (to / from).ln() } else { from };
-        let speeds = f64::from(job.lobes.speeds);
-        parts.push((speeds * 45.0 * point_ms(mean), "/lobes/speeds"));
-        if job.lobes.map {
-            let refined = 1.0 + 0.3 * f64::from(job.lobes.refinement);
-            parts.push((speeds * f64::from(job.lobes.depths) * refined * point_ms(mean), "/lobes/depths"));
-            bytes += 40 * u64::from(job.lobes.speeds) * u64::from(job.lobes.depths);
-        }
-    }
-    let ms = parts.iter().map(|(ms, _)| ms).sum();
-    let driver = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or("/cut", |(_, driver)| driver);
-    Cost { ms, bytes, driver }
 }
 
 /// The equations that acted.
@@ -275,16 +212,23 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, &["time_missing", "opened_without_clamp_force"]],
+    faults: &[
+        check::CODES,
+        uncertain::CODES,
+        DISTRIBUTION_CODES,
+        QUANTITY_CODES,
+        &["time_missing", "opened_without_clamp_force"],
+    ],
     failures: &[&["undamped_resonance"]],
-    warnings: &[advice::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES],
+    warnings: &[advice::WARNING_CODES, conformance::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, probable_depths::EXPLANATION_CODES],
     stages: &[&[
         "stage_simulation",
         "stage_clamp_force",
         "stage_limits",
         "stage_boundary",
         "stage_map",
+        "stage_certainty",
         "stage_fixture_done",
     ]],
     labels: &[picture::LABEL_CODES],

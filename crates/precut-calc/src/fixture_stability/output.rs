@@ -3,6 +3,9 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::conformance::FixtureConformance;
+use super::probable_depths::ProbableDepths;
+
 /// Whether the workpiece holds still enough in its vise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(title = "FixtureStabilityResult")]
@@ -39,6 +42,12 @@ pub struct FixtureOutcome {
     pub lobes: Option<LobeDiagram>,
     /// Oscillograms; only with the analysis `history`.
     pub history: Option<Histories>,
+    /// How probable it is that the cut stays quiet; null where nothing is uncertain, and where it would take long and the analysis
+    /// `certainty` is not asked.
+    pub conformance: Option<FixtureConformance>,
+    /// Depths that are stable with a probability over the spindle speed; only with the analysis `certainty`, and of a vise with one
+    /// mode, even teeth and linear joints.
+    pub probable_depths: Option<ProbableDepths>,
 }
 
 /// What happens at the working point.

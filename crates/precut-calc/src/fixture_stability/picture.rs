@@ -6,9 +6,10 @@ use super::floquet::Working;
 use super::input::FixtureJob;
 use super::lobes::Map;
 use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeDiagram, LobeMap, Oscillogram};
+use super::probable_depths::ProbableDepths;
 
 pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "last_revolution", "chip", "amplitude"];
-pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "entry", "steady", "arc"];
+pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "probable_depths", "entry", "steady", "arc"];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -25,6 +26,8 @@ pub(super) const LABEL_CODES: &[&str] = &[
     "safe_area",
     "chatter_limit",
     "zeroth_order_limit",
+    "probable_limits",
+    "wanted_probability",
     "amplitude_limit",
     "movable_joint_limit",
     "fixed_joint_limit",
@@ -139,6 +142,9 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
         upper: of.safe_mm(),
         role: Role::Stable,
     });
+    if let Some(depths) = &outcome.probable_depths {
+        items.extend(probable(depths));
+    }
     items.push(line("chatter_limit", x, of.chatter_mm.clone(), Role::Limit));
     if let Some(depths) = of.examined_without_chatter_mm() {
         items.push(line("examined_up_to", x, depths, Role::Unstable));
@@ -181,6 +187,22 @@ fn lobes(job: &FixtureJob, outcome: &FixtureOutcome, lobes: &LobeDiagram) -> Vec
         about: Some(Said { label: "feed_per_tooth_stays" }),
     }));
     items
+}
+
+/// Between which depths nine of ten such vises and one of ten are stable, as far as the diagram goes, and the wanted share of them.
+fn probable(depths: &ProbableDepths) -> [Item; 2] {
+    let x = &depths.spindle_speed_rpm;
+    let known = depths.stable_10_percent_mm.iter().chain(&depths.stable_90_percent_mm).flatten();
+    let top = known.copied().fold(0.0, f64::max);
+    let up_to = |of: &[Option<f64>]| of.iter().map(|depth| depth.unwrap_or(top)).collect();
+    let band = Item::Band {
+        name: "probable_limits",
+        x: x.clone(),
+        lower: up_to(&depths.stable_90_percent_mm),
+        upper: up_to(&depths.stable_10_percent_mm),
+        role: Role::Uncertainty,
+    };
+    [band, line("wanted_probability", x, depths.stable_wanted_mm.clone(), Role::Command)]
 }
 
 /// The job of a place in the lobe diagram: speed and depth to three digits, the feed per tooth as it is.
@@ -291,6 +313,7 @@ pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
                 Column::numbers("lost_cut_share", "1", &curve.lost_cut_share),
             ],
         },
+        probable_table(outcome.probable_depths.as_ref()),
         wave_table("entry", entry),
         wave_table("steady", steady),
         Table {
@@ -303,6 +326,21 @@ pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
             ],
         },
     ]
+}
+
+fn probable_table(depths: Option<&ProbableDepths>) -> Table {
+    let none = ProbableDepths::default();
+    let of = depths.unwrap_or(&none);
+    Table {
+        id: "probable_depths",
+        columns: vec![
+            Column::numbers("spindle_speed", "rev/min", &of.spindle_speed_rpm),
+            Column::optional("stable_90_percent", "mm", &of.stable_90_percent_mm),
+            Column::optional("stable_50_percent", "mm", &of.stable_50_percent_mm),
+            Column::optional("stable_10_percent", "mm", &of.stable_10_percent_mm),
+            Column::optional("stable_wanted", "mm", &of.stable_wanted_mm),
+        ],
+    }
 }
 
 /// One row per point of the map.

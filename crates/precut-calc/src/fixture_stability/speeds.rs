@@ -223,7 +223,7 @@ fn tried(study: &Study<'_>, spindle_speed_rpm: f64, most_mm: f64) -> Result<Opti
 }
 
 /// A positive number with as many digits as a sentence says of it.
-fn said(value: f64, digits: i32, rounded: fn(f64) -> f64) -> f64 {
+pub(super) fn said(value: f64, digits: i32, rounded: fn(f64) -> f64) -> f64 {
     let scale = 10.0_f64.powf(f64::from(digits) - 1.0 - value.log10().floor());
     rounded(value * scale) / scale
 }

@@ -1,0 +1,114 @@
+//! The quantities of a job that are uncertain, and how they go together (`certainty/1.1`, `certainty/1.3`).
+
+use crate::calculator::{Finding, Violations};
+
+use super::{Contradiction, Distribution, Level, Scores, Source, WidthUnit};
+
+/// Codes of the faults found here.
+pub(crate) const CODES: &[&str] = &["duplicate_quantity", "bad_correlation", "correlations_contradict"];
+
+/// What may be uncertain in the jobs of a calculator.
+pub(crate) trait Quantity: Copy + PartialEq {
+    /// Its name, as in the contract.
+    fn name(self) -> &'static str;
+    /// In what its width is given.
+    fn unit(self) -> WidthUnit;
+}
+
+/// A quantity with all that is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Uncertain<Q> {
+    pub quantity: Q,
+    pub distribution: Distribution,
+    pub level: Level,
+    pub source: Source,
+}
+
+/// How two quantities go together: which, and the correlation of their scores.
+pub(crate) type Pair<'a, Q> = (&'a [Q], f64);
+
+/// All quantities of a job that are uncertain, and how they go together.
+#[derive(Debug, Clone)]
+pub(crate) struct Uncertainties<Q> {
+    pub of: Vec<Uncertain<Q>>,
+    pub scores: Scores,
+}
+
+impl<Q: Quantity> Uncertainties<Q> {
+    /// Of quantities, each named once; pairs with one that is not among them say nothing.
+    pub(crate) fn new<'a>(
+        of: Vec<Uncertain<Q>>,
+        pairs: impl IntoIterator<Item = Pair<'a, Q>>,
+    ) -> Result<Self, Contradiction>
+    where
+        Q: 'a,
+    {
+        let place = |quantity| of.iter().position(|one: &Uncertain<Q>| one.quantity == quantity);
+        let pairs: Vec<(usize, usize, f64)> = pairs
+            .into_iter()
+            .filter_map(|(between, coefficient)| match *between {
+                [one, other] => Some((place(one)?, place(other)?, coefficient)),
+                _ => None,
+            })
+            .collect();
+        let scores = Scores::new(of.len(), &pairs)?;
+        Ok(Self { of, scores })
+    }
+
+    /// What every quantity comes to at independent scores: factors, and additions in um.
+    pub(crate) fn values(&self, independent: &[f64]) -> Vec<f64> {
+        self.of.iter().zip(self.scores.of(independent)).map(|(one, score)| one.distribution.at(score)).collect()
+    }
+
+    /// Of every quantity what it comes to at its median, and half of what lies between scores of -1 and 1.
+    pub(crate) fn scales(&self) -> Vec<(f64, f64)> {
+        let of = |one: &Uncertain<Q>| {
+            let at = |score: f64| one.distribution.at(score);
+            (at(0.0), 0.5 * (at(1.0) - at(-1.0)))
+        };
+        self.of.iter().map(of).collect()
+    }
+
+    /// The same with half of the width of one of them.
+    pub(crate) fn halved(&self, index: usize) -> Self {
+        let mut halved = self.clone();
+        halved.of[index].distribution = halved.of[index].distribution.halved();
+        halved
+    }
+}
+
+/// Finds what cannot be in the quantities of the block `uncertainty`: each with its distribution.
+pub(crate) fn check_quantities<Q: Quantity>(stated: &[(Q, &Distribution)], violations: &mut Violations) {
+    for (i, (quantity, distribution)) in stated.iter().enumerate() {
+        let at = |field: &str| format!("/uncertainty/quantities/{i}{field}");
+        distribution.check(quantity.unit(), &at("/distribution"), violations);
+        violations.require(stated[..i].iter().all(|before| before.0 != *quantity), || {
+            Finding::new("duplicate_quantity", at("/quantity")).with("quantity", quantity.name())
+        });
+    }
+}
+
+/// Finds what cannot be in its correlations; `contradiction` is what [`Uncertainties::new`] says of them.
+pub(crate) fn check_correlations<Q: Quantity>(
+    pairs: &[Pair<'_, Q>],
+    contradiction: impl FnOnce() -> Option<Contradiction>,
+    violations: &mut Violations,
+) {
+    let mut are_pairs = true;
+    for (i, (between, _)) in pairs.iter().enumerate() {
+        let [one, other] = **between else { continue };
+        let same = |before: &Pair<'_, Q>| *before.0 == [one, other] || *before.0 == [other, one];
+        let is_pair = one != other && !pairs[..i].iter().any(same);
+        are_pairs &= is_pair;
+        violations.require(is_pair, || {
+            Finding::new("bad_correlation", format!("/uncertainty/correlations/{i}/between"))
+                .with("one", one.name())
+                .with("other", other.name())
+        });
+    }
+    if are_pairs && let Some(Contradiction { largest_factor }) = contradiction() {
+        violations.add(
+            Finding::new("correlations_contradict", "/uncertainty/correlations").with("largest_factor", largest_factor),
+        );
+    }
+}
