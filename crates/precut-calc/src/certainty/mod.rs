@@ -16,6 +16,14 @@ pub use distribution::{Distribution, Level, Source};
 pub(crate) use scores::{Contradiction, Scores};
 pub(crate) use surface::Surface;
 
+/// A probability is told between these.
+const LEAST: f64 = 1e-6;
+
+/// A probability as it is told: never 0 or 1.
+pub(crate) fn bounded(probability: f64) -> f64 {
+    probability.clamp(LEAST, 1.0 - LEAST)
+}
+
 /// Probability that a standard normal number is below `x`.
 pub(crate) fn normal_below(x: f64) -> f64 {
     0.5 * statrs::function::erf::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
