@@ -5,6 +5,7 @@
 use crate::draw::Draw;
 use crate::feed_support;
 use precut_calc::calculator::{Calculator as _, Check as _, Failure, Unwatched, Violations};
+use precut_calc::feed_schedule::fit::{FitJob, MachinabilityFit};
 use precut_calc::feed_schedule::{FeedSchedule, Job};
 use serde_json::{Value, json};
 
@@ -266,8 +267,9 @@ fn a_schedule_uses_the_interval_of_the_fit() {
         trial(90.0, 0.25, 1.0, -0.05),
     ];
     let at = json!({ "speed_m_per_min": 100.0, "feed_mm_per_rev": 0.15, "depth_mm": 0.8 });
-    let fit = json!({ "trials": trials, "form": "log_log", "terms": "all", "resamples": 0, "predict": [at], "level_percent": 90 });
-    let fit = feed_support::fitted(fit);
+    let fit = json!({ "trials": trials, "form": "log_log", "terms": "all", "resamples": 0, "predict": [at], "confidence": 0.9 });
+    let fit = MachinabilityFit::run(&serde_json::from_value::<FitJob>(fit).unwrap(), &Unwatched).unwrap().output;
+    let fit = serde_json::to_value(fit).unwrap();
     let upper = number(&fit, "/predictions/0/trial_upper");
     let mut job = case("f1-each-one-percent")["job"].clone();
     job["models"] = json!({ "roughness": fit["models"]["roughness"] });
