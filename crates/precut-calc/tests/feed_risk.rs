@@ -5,6 +5,7 @@
 use crate::draw::Draw;
 use crate::feed_support;
 use precut_calc::calculator::{Calculator as _, Check as _, Failure, Unwatched, Violations};
+use precut_calc::feed_schedule::fit::{FitJob, MachinabilityFit};
 use precut_calc::feed_schedule::{FeedSchedule, Job};
 use serde_json::{Value, json};
 
@@ -31,7 +32,7 @@ fn near(name: &str, found: f64, expected: f64, relative: f64) {
 
 #[test]
 fn references_are_met() {
-    for name in ["f1-each-one-percent", "f2-joint-one-percent"] {
+    for name in ["f1-each-one-percent", "f2-joint-one-percent", "f3-covariance-each"] {
         let case = case(name);
         let expected = &case["expected"];
         let answer = solved(&case["job"]);
@@ -246,4 +247,71 @@ fn a_risk_at_an_end_is_not_said_to_cost_least() {
         let said = explanation.iter().find(|message| message.code == "limits_kept").unwrap();
         assert!(said.values.get("found_percent").is_none());
     }
+}
+
+/// A fit's covariance as a schedule takes it: a limit at the upper end of a new trial's 90 % interval is passed by one in twenty, and
+/// a plan on the edge of what the risk allows stands there.
+#[test]
+fn a_schedule_uses_the_interval_of_the_fit() {
+    let trial = |v: f64, s: f64, t: f64, off: f64| {
+        let ra = (1.2 - 0.15 * v.ln() + 1.1 * s.ln() + 0.2 * t.ln() + off).exp() * 10.0;
+        json!({ "speed_m_per_min": v, "feed_mm_per_rev": s, "depth_mm": t, "roughness_um": ra })
+    };
+    let trials = [
+        trial(80.0, 0.1, 0.5, 0.04),
+        trial(160.0, 0.1, 1.5, -0.06),
+        trial(80.0, 0.3, 1.5, 0.02),
+        trial(160.0, 0.3, 0.5, 0.05),
+        trial(113.0, 0.17, 0.9, -0.03),
+        trial(113.0, 0.2, 0.8, 0.01),
+        trial(90.0, 0.25, 1.0, -0.05),
+    ];
+    let at = json!({ "speed_m_per_min": 100.0, "feed_mm_per_rev": 0.15, "depth_mm": 0.8 });
+    let fit = json!({ "trials": trials, "form": "log_log", "terms": "all", "resamples": 0, "predict": [at], "confidence": 0.9 });
+    let fit = MachinabilityFit::run(&serde_json::from_value::<FitJob>(fit).unwrap(), &Unwatched).unwrap().output;
+    let fit = serde_json::to_value(fit).unwrap();
+    let upper = number(&fit, "/predictions/0/trial_upper");
+    let mut job = case("f1-each-one-percent")["job"].clone();
+    job["models"] = json!({ "roughness": fit["models"]["roughness"] });
+    job["zones"] = json!([{ "id": "z", "z_start_mm": 0, "z_end_mm": 100, "diameter_mm": 60, "depth_mm": 0.8, "roughness_max_um": upper }]);
+    job["variables"] =
+        json!({ "speed": "fixed", "fixed_speed_m_per_min": 100.0, "feed": "fixed", "fixed_feed_mm_per_rev": 0.15 });
+    job["objective"] = json!({ "kind": "time" });
+    job["limits"] = json!({ "feed_min_mm_per_rev": 0.05, "feed_max_mm_per_rev": 0.4, "speed_min_m_per_min": 60, "speed_max_m_per_min": 260 });
+    job["risk"] = json!({ "kind": "each", "risk_percent": 5.001 });
+    let kept = number(&solved(&job), "/conformance/limits/0/probability");
+    assert!((kept - 0.95).abs() < 1e-9, "{kept}");
+    job["risk"]["risk_percent"] = json!(4.999);
+    assert!(matches!(answered(&job), Err(Failure::OutOfModel(_))));
+}
+
+/// With a joint risk and coefficients that all zones have in common no more parts fail than is asked.
+#[test]
+fn a_joint_risk_holds_with_common_coefficients() {
+    let mut job = case("f3-covariance-each")["job"].clone();
+    job["risk"] = json!({ "kind": "joint", "risk_percent": 5.0 });
+    let answer = solved(&job);
+    let joint = number(&answer, "/conformance/joint_probability");
+    // Boole's bound: above what is asked, and not far.
+    assert!((0.95..0.98).contains(&joint), "{joint}");
+    job["risk"] = json!({ "kind": "joint", "risk_percent": 2.0 });
+    assert!(number(&solved(&job), "/objective") > number(&answer, "/objective"));
+}
+
+#[test]
+fn a_covariance_that_is_none_is_told() {
+    let refused = |covariance: Value| {
+        let mut job = case("f3-covariance-each")["job"].clone();
+        job["models"]["roughness"]["coefficient_covariance"] = covariance;
+        let job: Job = serde_json::from_value(job).unwrap();
+        let mut violations = Violations::default();
+        job.check(&mut violations);
+        violations.into_vec().iter().any(|fault| fault.code == "bad_covariance")
+    };
+    let two = |matrix: Value| json!({ "order": ["constant", "feed_exponent"], "matrix": matrix });
+    assert!(!refused(two(json!([[1.0, 0.5], [0.5, 1.0]]))));
+    assert!(refused(two(json!([[1.0, 1.5], [1.5, 1.0]]))));
+    assert!(refused(two(json!([[1.0, 0.5], [0.4, 1.0]]))));
+    assert!(refused(two(json!([[1.0, 0.5]]))));
+    assert!(refused(json!({ "order": ["constant", "constant"], "matrix": [[1.0, 0.5], [0.5, 1.0]] })));
 }

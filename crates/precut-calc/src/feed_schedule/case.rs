@@ -10,7 +10,7 @@ use super::compliance::Held;
 use super::input::{Goal, Job, Limits, Machine, Reference, UsageScope, Variables, Zone};
 use super::models::Output;
 use super::risk;
-use super::scatter::OUTPUT_LIMITS;
+use super::scatter::{OUTPUT_LIMITS, Scatter};
 
 /// What is scheduled.
 #[derive(Debug, Clone)]
@@ -60,7 +60,7 @@ pub(super) struct ZoneCase {
     /// What a limit on the feed's gradient leaves to a zone that was found.
     pub ceiling: Option<Ceiling>,
     /// By how much limits on outputs are moved in at the job's risk, in the scale of the model; by [`OUTPUT_LIMITS`].
-    pub margins: [f64; OUTPUT_LIMITS.len()],
+    pub margins: [Margin; OUTPUT_LIMITS.len()],
     /// Whether the next zone touches this one: a link in the chain of feed steps.
     pub touches_next: bool,
     /// Exponent of the depth in the passive force.
@@ -69,6 +69,31 @@ pub(super) struct ZoneCase {
     pub models: [Option<ActingModel>; 6],
     /// Further outputs, in the job's order.
     pub further: Vec<ActingModel>,
+}
+
+/// By how much a limit on an output is moved in: so many standard deviations of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Margin {
+    deviations: f64,
+    scatter: Option<Scatter>,
+}
+
+impl Margin {
+    pub(super) fn new(deviations: f64, scatter: Scatter) -> Self {
+        Self { deviations, scatter: Some(scatter) }
+    }
+
+    fn bends(&self) -> bool {
+        self.scatter.is_some_and(|scatter| scatter.bends())
+    }
+
+    /// The tangent at ln V, ln S: its constant and what it has by them. Upward of it lies nothing but the margin itself, which is
+    /// convex where it moves a limit in.
+    pub(super) fn form(&self, u: f64, x: f64) -> [f64; 3] {
+        let Some(scatter) = self.scatter else { return [0.0; 3] };
+        let (deviation, [by_u, by_x]) = scatter.deviation(u, x);
+        [deviation - by_u * u - by_x * x, by_u, by_x].map(|part| self.deviations * part)
+    }
 }
 
 /// The least of the continuous schedule over a zone: what the zone may not exceed where its feed may change along the
@@ -120,8 +145,8 @@ impl ZoneCase {
     }
 
     /// By how much a limit is moved in.
-    pub(super) fn margin(&self, limit: &str) -> f64 {
-        OUTPUT_LIMITS.iter().position(|one| one.name == limit).map_or(0.0, |place| self.margins[place])
+    pub(super) fn margin(&self, limit: &str) -> Margin {
+        OUTPUT_LIMITS.iter().position(|one| one.name == limit).map_or(Margin::default(), |place| self.margins[place])
     }
 
     /// Compliance that bends, um/N; `None` where there is none to speak of.
@@ -217,7 +242,7 @@ impl<'a> Resolver<'a> {
             hardening_depth_max_um: zone.hardening_depth_max_um,
             feed_max_mm_per_rev: zone.feed_max_mm_per_rev.map_or(general, |own| own.min(general)),
             ceiling: None,
-            margins: [0.0; OUTPUT_LIMITS.len()],
+            margins: [Margin::default(); OUTPUT_LIMITS.len()],
             touches_next: next.is_some_and(|next| (next.z_start_mm - zone.z_end_mm).abs() <= TOUCHING_MM),
             force_depth_exponent: self.depth_exponent(depth_mm),
             models: self.models(depth_mm),
@@ -353,10 +378,11 @@ impl Case {
         }
     }
 
-    /// Whether any model bends over speed and feed.
+    /// Whether any model, or the margin of a limit, bends over speed and feed.
     pub(super) fn bends(&self) -> bool {
         let models = self.zones.iter().flat_map(|zone| zone.models.iter().flatten().chain(&zone.further));
-        models.into_iter().any(|model| model.bends() != Bend::Straight)
+        let margins = self.zones.iter().flat_map(|zone| &zone.margins);
+        models.into_iter().any(|model| model.bends() != Bend::Straight) || margins.into_iter().any(Margin::bends)
     }
 }
 

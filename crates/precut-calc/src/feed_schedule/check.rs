@@ -1,7 +1,7 @@
 //! Rules between fields. What one field alone may hold stands in its schema.
 
 use crate::calculator::{Check, Finding, Violations};
-use crate::machinability::{self, MachinabilityModel, ModelForm};
+use crate::machinability::{self, CoefficientCovariance, MachinabilityModel, ModelCoefficient, ModelForm};
 use crate::shaft::{self, Support};
 
 use super::case::TOUCHING_MM;
@@ -37,9 +37,13 @@ pub(super) const CODES: &[&str] = &[
     "bad_pass_depths",
     "method_not_together",
     "absurd_exponent",
+    "bad_covariance",
     "bad_diameter",
     "negative_compliance",
 ];
+
+/// An eigenvalue of a covariance below 0 by no more than this share of the largest is round-off of what was printed.
+const ROUNDED: f64 = 1e-6;
 
 impl Check for Job {
     fn check(&self, violations: &mut Violations) {
@@ -108,6 +112,33 @@ fn check_model(job: &Job, model: &MachinabilityModel, at: &str, violations: &mut
     violations.require(!model.needs_angle() || job.cutting_edge_angle_deg.is_some(), || {
         Finding::new("edge_angle_missing", "/cutting_edge_angle_deg").with("model", at.to_owned())
     });
+    if let Some(covariance) = &model.coefficient_covariance {
+        check_covariance(job, covariance, &format!("{at}/coefficient_covariance"), violations);
+    }
+}
+
+/// A covariance has a row and a column for every coefficient, is symmetric, and lets no combination of them vary by less than
+/// nothing.
+fn check_covariance(job: &Job, covariance: &CoefficientCovariance, at: &str, violations: &mut Violations) {
+    let order = &covariance.order;
+    let is_named_once = order.iter().enumerate().all(|(i, one)| !order[..i].contains(one));
+    violations.require(is_named_once, || {
+        Finding::new("bad_covariance", format!("{at}/order")).with("reason", "order").with("count", order.len())
+    });
+    let has_angle = order.contains(&ModelCoefficient::AngleExponent);
+    violations.require(!has_angle || job.cutting_edge_angle_deg.is_some(), || {
+        Finding::new("edge_angle_missing", "/cutting_edge_angle_deg").with("model", at.to_owned())
+    });
+    let bad = |reason: &'static str| {
+        Finding::new("bad_covariance", format!("{at}/matrix")).with("reason", reason).with("count", order.len())
+    };
+    let Some(matrix) = covariance.as_matrix() else {
+        violations.add(bad("symmetric"));
+        return;
+    };
+    let eigenvalues = matrix.symmetric_eigenvalues();
+    let (least, largest) = (eigenvalues.min(), eigenvalues.max());
+    violations.require(least >= -ROUNDED * largest.abs(), || bad("negative").with("least", least));
 }
 
 fn check_zones(job: &Job, violations: &mut Violations) {

@@ -369,12 +369,19 @@ impl Builder<'_> {
         self.variation.about.map_or_else(|| middle_of(self.case, i), |(at, _)| at[i])
     }
 
+    /// By how much a limit in a zone is moved in, as its constant and what it has by ln V and ln S.
+    fn margin(&self, i: usize, kind: &Kind) -> [f64; 3] {
+        let (u, x) = self.about(i);
+        self.case.zones[i].margin(&kind.name()).form(u, x)
+    }
+
     /// An upper limit on an output, in logarithms or plain.
     fn output_limit(&mut self, i: usize, output: Output, limit: Option<f64>, kind: Kind) {
         let (Some(form), Some(limit)) = (self.form(i, output), limit) else { return };
         let bound = if form.log_log { limit.ln() } else { limit };
-        let constant = form.constant - bound + self.case.zones[i].margin(&kind.name());
-        self.row(i, form.speed, form.feed, constant, kind, limit, output.unit(), !form.log_log);
+        let [margin, by_speed, by_feed] = self.margin(i, &kind);
+        let constant = form.constant - bound + margin;
+        self.row(i, form.speed + by_speed, form.feed + by_feed, constant, kind, limit, output.unit(), !form.log_log);
     }
 
     fn zone(&mut self, i: usize) {
@@ -383,8 +390,9 @@ impl Builder<'_> {
         let (limits, machine) = (&case.limits, &case.machine);
         if let (Some(y), Some(c), Some(limit)) = (self.form(i, Output::ForceY), zone.yields(), zone.deflection_max_um) {
             let kappa = limits.deflection_residual_fraction;
-            let constant = y.constant + (kappa * c / limit).ln() + zone.margin(&Kind::Deflection.name());
-            self.row(i, y.speed, y.feed, constant, Kind::Deflection, limit, "um", false);
+            let [margin, by_speed, by_feed] = self.margin(i, &Kind::Deflection);
+            let constant = y.constant + (kappa * c / limit).ln() + margin;
+            self.row(i, y.speed + by_speed, y.feed + by_feed, constant, Kind::Deflection, limit, "um", false);
         }
         self.output_limit(i, Output::Roughness, zone.roughness_max_um, Kind::Roughness);
         self.output_limit(i, Output::Hardening, zone.hardening_max_percent, Kind::Hardening);

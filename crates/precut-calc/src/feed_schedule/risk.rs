@@ -10,13 +10,13 @@ use crate::calculator::{Failure, Finding, Monitor, Violations, checkpoint};
 use crate::certainty::normal_below;
 use crate::num::gp::{self, Affines, Objective, Solution};
 
-use super::case::Case;
+use super::case::{Case, Margin, ZoneCase};
 use super::compliance::Held;
 use super::input::{Goal, Job};
 use super::models::Output;
 use super::plan::Method;
 use super::program::{Built, Kind, Place, Variation, build};
-use super::scatter::{OUTPUT_LIMITS, deviations, scatter};
+use super::scatter::{OUTPUT_LIMITS, Scatter, deviations, scatter};
 use super::solve::{Solved, Unsolved, convex, finish, safer, solve};
 
 /// Codes of the faults found here.
@@ -171,17 +171,23 @@ pub(super) fn is_at_an_end(percent: f64) -> bool {
     near(COSTS_LEAST.0) || near(COSTS_LEAST.1)
 }
 
-/// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and the standard deviation.
+/// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and how.
 #[derive(Debug, Clone, Copy)]
 struct Scattered {
     zone: usize,
     limit: usize,
-    deviation: f64,
+    scatter: Scatter,
 }
 
 impl Scattered {
     fn name(self) -> &'static str {
         OUTPUT_LIMITS[self.limit].name
+    }
+
+    /// Its standard deviation at a schedule, and the slopes of that over ln V and ln S.
+    fn deviation(self, at: &[(f64, f64)]) -> (f64, [f64; 2]) {
+        let (u, x) = at[self.zone];
+        self.scatter.deviation(u, x)
     }
 }
 
@@ -190,8 +196,8 @@ fn scattered(case: &Case, job: &Job) -> Vec<Scattered> {
     for (zone, of) in case.zones.iter().enumerate() {
         for (place, limit) in OUTPUT_LIMITS.iter().enumerate() {
             let is_limited = of.model(limit.output).is_some() && (limit.limit)(case, of).is_some();
-            if let (true, Some((deviation, _))) = (is_limited, scatter(job, limit.output)) {
-                all.push(Scattered { zone, limit: place, deviation });
+            if let (true, Some(scatter)) = (is_limited, scatter(job, limit.output, of.depth_mm)) {
+                all.push(Scattered { zone, limit: place, scatter });
             }
         }
     }
@@ -200,8 +206,8 @@ fn scattered(case: &Case, job: &Job) -> Vec<Scattered> {
 
 /// Limits moved in by what the job's risk asks for; a joint one is shared evenly, until it is shared out.
 pub(super) fn move_in(case: &mut Case, job: &Job) {
-    if let (Some(risk), Some((deviation, _))) = (job.risk.of_edges(), scatter(job, Output::ToolLife)) {
-        case.edge_margin = deviations(risk) * deviation;
+    if let Some(risk) = job.risk.of_edges() {
+        case.edge_margin = case.zones.iter().filter_map(|zone| of_edges(case, zone, job, risk)).fold(0.0, f64::max);
     }
     let Some(risk) = job.risk.of_part() else { return };
     let all = scattered(case, job);
@@ -210,8 +216,20 @@ pub(super) fn move_in(case: &mut Case, job: &Job) {
         _ => risk,
     };
     for one in &all {
-        case.zones[one.zone].margins[one.limit] = deviations(own) * one.deviation;
+        case.zones[one.zone].margins[one.limit] = Margin::new(one.scatter.deviations(own), one.scatter);
     }
+}
+
+/// By how much less of the life of an edge is used in a zone: where coefficients are uncertain by the largest that they bring at any
+/// speed and feed that are allowed, so that the risk is never above the stated one.
+fn of_edges(case: &Case, zone: &ZoneCase, job: &Job, risk: f64) -> Option<f64> {
+    let scatter = scatter(job, Output::ToolLife, zone.depth_mm)?;
+    let limits = &case.limits;
+    let corners = [limits.speed_min_m_per_min, limits.speed_max_m_per_min]
+        .into_iter()
+        .flat_map(|speed| [limits.feed_min_mm_per_rev, zone.feed_max_mm_per_rev].map(|feed| (speed.ln(), feed.ln())));
+    let largest = corners.map(|(u, x)| scatter.deviation(u, x).0).fold(0.0, f64::max);
+    Some(scatter.deviations(risk) * largest)
 }
 
 /// The schedule of a case with its risk shared out, and what a percent of that risk is worth.
@@ -227,15 +245,20 @@ pub(super) fn solved(
     };
     let all = scattered(&case, job);
     if matches!(job.risk, Risk::Joint { .. }) && !all.is_empty() {
-        let mut sharing = Sharing { case, all, budget: -(-risk).ln_1p(), monitor };
+        let is_common = all.iter().any(|one| one.scatter.bends());
+        // d budget/d ln alpha.
+        let (budget, slope) = if is_common { (risk, risk) } else { (-(-risk).ln_1p(), risk / (1.0 - risk)) };
+        let mut sharing = Sharing { case, all, budget, is_common, monitor };
         let (solved, worth) = sharing.shared_out(job, held)?;
-        return Ok((sharing.case, solved, Some(worth * risk / (1.0 - risk))));
+        return Ok((sharing.case, solved, Some(worth * slope)));
     }
     match solve(&case, true, monitor) {
         Ok(solved) => {
             // d ln f/d ln alpha over all limits: each moves by s alpha/phi(q).
-            let slope = risk / density(deviations(risk));
-            let worth = all.iter().map(|one| multiplier(&solved, one) * one.deviation * slope).sum();
+            let slope = |one: &Scattered| {
+                one.deviation(&solved.at).0 * risk / one.scatter.density(one.scatter.deviations(risk))
+            };
+            let worth = all.iter().map(|one| multiplier(&solved, one) * slope(one)).sum();
             Ok((case, solved, Some(worth)))
         }
         Err(Unsolved::Infeasible(found)) => {
@@ -301,12 +324,15 @@ fn least_of_each(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Resul
 }
 
 /// A joint risk among the limits of a part: with b_k = -ln Phi(t_k) the sum of all b is at most -ln(1 - alpha), exact where
-/// results scatter independently (`certainty/5.3`). That sum is convex over the logarithms of speed and feed: it is held by
-/// tangents, each at the optimum of those before (Kelley 1960), until the optimum keeps it.
+/// results scatter independently; with coefficients that are common to them b_k = Phi(-t_k) and at most alpha, whatever goes
+/// together (`certainty/5.3`). That sum is convex over the logarithms of speed and feed: it is held by tangents, each at the
+/// optimum of those before (Kelley 1960), until the optimum keeps it.
 struct Sharing<'a> {
     case: Case,
     all: Vec<Scattered>,
     budget: f64,
+    /// Whether coefficients that limits have in common are uncertain.
+    is_common: bool,
     monitor: &'a dyn Monitor,
 }
 
@@ -328,7 +354,8 @@ impl Sharing<'_> {
         let mut about = first.at.clone();
         let safest = self.safest(&plain, first)?;
         if safest.sum > self.budget {
-            return Err(at_this_risk(job, -(-safest.sum).exp_m1()));
+            let least = if self.is_common { safest.sum } else { -(-safest.sum).exp_m1() };
+            return Err(at_this_risk(job, least));
         }
         self.touch(&plain, &safest, &mut tangents);
         for _ in 0..ROUNDS {
@@ -337,7 +364,7 @@ impl Sharing<'_> {
             let at = (0..plain.zones.len()).map(|i| (built.speed[i].at(&solution.y), built.feed[i].at(&solution.y)));
             let shares = self.shares_at(&plain, at.collect());
             // Models that bend are straight only where they were linearised.
-            let is_there = !plain.bends() || furthest(&shares.at, &about) < SETTLED;
+            let is_there = !(plain.bends() || self.is_common) || furthest(&shares.at, &about) < SETTLED;
             if is_there && shares.sum <= self.budget * (1.0 + SHARED) {
                 return Ok(self.settled(&plain, built, solution, shares, conic));
             }
@@ -358,9 +385,18 @@ impl Sharing<'_> {
         let mut sums = vec![0.0; built.program.variables()];
         let mut constant = at.sum - self.budget;
         for (one, (row, t)) in self.all.iter().zip(&at.rows) {
-            let slope = hazard(*t) / one.deviation;
+            let (deviation, by) = one.deviation(&at.at);
+            let slope = self.slope(one, *t) / deviation;
             constant += slope * (rows.constant(*row) - rows.value(*row, &built.program.start));
             rows.entries(*row).for_each(|(variable, a)| sums[variable] += slope * a);
+            // The limit comes nearer, too, where the deviation grows.
+            let (u, x) = at.at[one.zone];
+            for (source, by, here) in [(built.speed[one.zone], by[0], u), (built.feed[one.zone], by[1], x)] {
+                if let Some(variable) = source.variable {
+                    sums[variable] += slope * t * by;
+                    constant -= slope * t * by * (here - source.constant);
+                }
+            }
         }
         let entries: Vec<(usize, f64)> =
             sums.into_iter().enumerate().filter(|(_, a)| a.abs() > 0.0).map(|(v, a)| (v, a / self.budget)).collect();
@@ -401,11 +437,11 @@ impl Sharing<'_> {
         let of_tangents: f64 = solution.row_multipliers.drain(count..).sum::<f64>() / self.budget;
         solution.row_slacks.truncate(count);
         for (one, (row, t)) in self.all.iter().zip(&shares.rows) {
-            solution.row_multipliers[*row] += of_tangents * hazard(*t) / one.deviation;
+            solution.row_multipliers[*row] += of_tangents * self.slope(one, *t) / one.deviation(&shares.at).0;
             solution.row_slacks[*row] = 0.0;
             // Those that take next to nothing of the risk need not stand where they are.
             let most = deviations(NOTHING * self.budget);
-            self.case.zones[one.zone].margins[one.limit] = t.min(most) * one.deviation;
+            self.case.zones[one.zone].margins[one.limit] = Margin::new(t.min(most), one.scatter);
         }
         let mut solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
         solved.shares_risk = true;
@@ -437,8 +473,18 @@ impl Sharing<'_> {
     /// What the limits use at a schedule.
     fn shares_at(&self, plain: &Case, at: Vec<(f64, f64)>) -> Shares {
         let rows = self.rows_at(plain, &at);
-        let sum = rows.iter().map(|(_, t)| -(-normal_below(-t)).ln_1p()).sum();
+        let sum = self.all.iter().zip(&rows).map(|(one, (_, t))| self.used(one, *t)).sum();
         Shares { at, rows, sum }
+    }
+
+    /// What a limit takes of the budget at so many deviations.
+    fn used(&self, one: &Scattered, t: f64) -> f64 {
+        if self.is_common { one.scatter.tail(t) } else { -(-normal_below(-t)).ln_1p() }
+    }
+
+    /// How fast that falls with them.
+    fn slope(&self, one: &Scattered, t: f64) -> f64 {
+        if self.is_common { one.scatter.density(t) } else { hazard(t) }
     }
 
     /// The row of every scattered limit in the program about a schedule, and its distance in deviations there.
@@ -453,7 +499,7 @@ impl Sharing<'_> {
         };
         let of = |one: &Scattered| {
             let row = row_of(one);
-            (row, -built.program.rows.value(row, y) / one.deviation)
+            (row, -built.program.rows.value(row, y) / one.deviation(at).0)
         };
         self.all.iter().map(of).collect()
     }
@@ -465,7 +511,7 @@ impl Sharing<'_> {
         let mut sums = vec![0.0; built.program.variables()];
         for (one, (row, t)) in self.all.iter().zip(self.rows_at(plain, at)) {
             for (variable, a) in built.program.rows.entries(row) {
-                sums[variable] += hazard(t) / one.deviation * a;
+                sums[variable] += self.slope(one, t) / one.deviation(at).0 * a;
             }
         }
         let entries: Vec<(usize, f64)> = sums.into_iter().enumerate().filter(|(_, a)| a.abs() > 0.0).collect();

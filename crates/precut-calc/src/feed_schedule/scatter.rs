@@ -1,9 +1,13 @@
 //! Limits on outputs that scatter: with which probability the parts, and the edges, keep them (`feed/10.1`, `certainty/5`).
 
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{Continuous, ContinuousCDF, StudentsT};
+
 use crate::calculator::Finding;
-use crate::certainty::normal_quantile;
+use crate::certainty::lines::points;
+use crate::certainty::{bounded, normal_quantile};
 use crate::machinability::ModelForm;
-use crate::num::stats::normal_tail;
+use crate::num::stats::{normal_tail, t_quantile};
 
 use super::case::{Case, ZoneCase};
 use super::input::Job;
@@ -14,8 +18,9 @@ use super::output::{Outcome, ScheduleConformance, ScheduledLimitKept, ZoneOutcom
 const LEAST_SHARE: f64 = 0.01;
 /// A share that was asked for may be passed by this, relative: what a schedule is solved to.
 const SOLVED: f64 = 1e-3;
-/// A probability is told between this and what is left of 1.
-const LEAST: f64 = 1e-6;
+/// Points over which coefficients that are uncertain are integrated, and their seed.
+const POINTS: usize = 4096;
+const SEED: u32 = 1;
 
 type Of = fn(&ZoneOutcome) -> Option<f64>;
 /// A limit that a zone has.
@@ -73,6 +78,82 @@ pub(super) const OUTPUT_LIMITS: [OutputLimit; 6] = [
     },
 ];
 
+/// How single results scatter about a model at one depth: about it, and with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Scatter {
+    /// s: about it.
+    residual: f64,
+    /// The variance that the coefficients bring, as a quadratic form in 1, ln V, ln S.
+    coefficients: Option<[[f64; 3]; 3]>,
+    /// Student's degrees of freedom, where they are stated.
+    degrees: Option<f64>,
+    log_log: bool,
+}
+
+impl Scatter {
+    /// Whether it changes with speed and feed.
+    pub(super) fn bends(&self) -> bool {
+        self.coefficients.is_some()
+    }
+
+    /// sigma(ln V, ln S) and its slopes (`certainty/5.1`).
+    pub(super) fn deviation(&self, u: f64, x: f64) -> (f64, [f64; 2]) {
+        let Some(q) = self.coefficients else { return (self.residual, [0.0; 2]) };
+        let by = q.map(|row| row[0] + row[1] * u + row[2] * x);
+        let deviation = (self.residual * self.residual + by[0] + by[1] * u + by[2] * x).max(0.0).sqrt();
+        let slope = |k: usize| if deviation > 0.0 { by[k] / deviation } else { 0.0 };
+        (deviation, [slope(1), slope(2)])
+    }
+
+    /// How many deviations lie between what is expected and a limit that is passed with this probability.
+    pub(super) fn deviations(&self, risk: f64) -> f64 {
+        self.degrees.map_or_else(|| deviations(risk), |degrees| t_quantile(1.0 - risk, degrees))
+    }
+
+    /// The density of the standardised result at so many deviations.
+    pub(super) fn density(&self, at: f64) -> f64 {
+        self.degrees.map_or_else(
+            || (-0.5 * at * at).exp() / (2.0 * std::f64::consts::PI).sqrt(),
+            |degrees| StudentsT::new(0.0, 1.0, degrees).map_or(0.0, |of| of.pdf(at)),
+        )
+    }
+
+    /// The probability that a limit is passed which lies so many deviations beyond what is expected.
+    pub(super) fn tail(&self, at: f64) -> f64 {
+        self.degrees.map_or_else(
+            || normal_tail(at),
+            |degrees| StudentsT::new(0.0, 1.0, degrees).map_or(f64::NAN, |of| of.sf(at)),
+        )
+    }
+
+    /// The same of one that lies so far beyond, in the scale of the model.
+    fn passed(&self, beyond: f64, (u, x): (f64, f64)) -> f64 {
+        self.tail(beyond / self.deviation(u, x).0)
+    }
+}
+
+/// How results scatter about an output's model at a depth; `None` where neither scatter nor covariance is stated.
+pub(super) fn scatter(job: &Job, output: Output, depth_mm: f64) -> Option<Scatter> {
+    let model = job.models.get(output)?;
+    let coefficients = model.coefficient_covariance.as_ref().and_then(|covariance| {
+        let matrix = covariance.as_matrix()?;
+        let factors = covariance.factors(depth_mm, job.cutting_edge_angle_deg);
+        let mut form = [[0.0; 3]; 3];
+        for (i, by) in factors.iter().enumerate() {
+            for (j, with) in factors.iter().enumerate() {
+                for (row, a) in form.iter_mut().zip(by) {
+                    row.iter_mut().zip(with).for_each(|(entry, b)| *entry += a * matrix[(i, j)] * b);
+                }
+            }
+        }
+        Some(form)
+    });
+    let residual = model.residual_scatter.unwrap_or(0.0);
+    let degrees = model.coefficient_covariance.as_ref().and_then(|covariance| covariance.degrees_of_freedom);
+    let log_log = model.form == ModelForm::LogLog;
+    (residual > 0.0 || coefficients.is_some()).then_some(Scatter { residual, coefficients, degrees, log_log })
+}
+
 /// A limit in a zone, or of an edge, that a result passes with some probability.
 struct Kept {
     output: Output,
@@ -82,43 +163,63 @@ struct Kept {
     limit: f64,
     /// The probability that it is passed.
     passed: f64,
+    /// How far the limit lies beyond what is expected, in the scale of the model, and where.
+    beyond: f64,
+    at: (f64, f64),
+    depth_mm: f64,
 }
 
 /// Every limit of a part whose output scatters, in every zone.
 fn of_part(job: &Job, case: &Case, outcome: &Outcome) -> Vec<Kept> {
     let mut all = Vec::new();
     for OutputLimit { output, name, of, limit } in &OUTPUT_LIMITS {
-        let Some((scatter, log_log)) = scatter(job, *output) else { continue };
         all.extend(case.zones.iter().zip(&outcome.zones).filter_map(|(zone, given)| {
+            let scatter = scatter(job, *output, zone.depth_mm)?;
             let (value, limit) = (of(given)?, limit(case, zone)?);
-            let beyond = if log_log { (limit / value).ln() } else { limit - value };
-            let passed = normal_tail(beyond / scatter);
-            Some(Kept { output: *output, name, zone: given.id.clone(), value, limit, passed })
+            let beyond = if scatter.log_log { (limit / value).ln() } else { limit - value };
+            let at = logarithms(given);
+            let passed = scatter.passed(beyond, at);
+            let zone_id = given.id.clone();
+            Some(Kept {
+                output: *output,
+                name,
+                zone: zone_id,
+                value,
+                limit,
+                passed,
+                beyond,
+                at,
+                depth_mm: zone.depth_mm,
+            })
         }));
     }
     all
 }
 
+fn logarithms(given: &ZoneOutcome) -> (f64, f64) {
+    (given.speed_m_per_min.ln(), given.feed_mm_per_rev.ln())
+}
+
 /// Every limit on the life of an edge: the least one of a zone, and what is used of each edge before it is changed.
 fn of_edges(job: &Job, case: &Case, outcome: &Outcome) -> (Vec<Kept>, Vec<Kept>) {
-    let Some((scatter, _)) = scatter(job, Output::ToolLife) else { return (Vec::new(), Vec::new()) };
-    let kept = |name, zone: &str, value: f64, limit: f64, beyond: f64| Kept {
-        output: Output::ToolLife,
-        name,
-        zone: zone.to_owned(),
-        value,
-        limit,
-        passed: normal_tail(beyond / scatter),
+    let kept = |name, zone: &str, value: f64, limit: f64, beyond: f64| {
+        let place = outcome.zones.iter().position(|given| given.id == zone)?;
+        let (at, depth_mm) = (logarithms(&outcome.zones[place]), case.zones.get(place)?.depth_mm);
+        let scatter = scatter(job, Output::ToolLife, depth_mm)?;
+        let passed = scatter.passed(beyond, at);
+        let zone = zone.to_owned();
+        Some(Kept { output: Output::ToolLife, name, zone, value, limit, passed, beyond, at, depth_mm })
     };
     let lives = outcome.zones.iter().filter_map(|zone| {
         let (life, least) = (zone.tool_life_min?, case.limits.tool_life_min_min?);
-        Some(kept("tool_life_min", &zone.id, life, least, (life / least).ln()))
+        kept("tool_life_min", &zone.id, life, least, (life / least).ln())
     });
-    // Life scatters from edge to edge: one that is to be used to U is worn out before with this probability.
+    // Life scatters from edge to edge: one that is to be used to U is worn out before with this probability; coefficients
+    // are taken at the zone after which it is changed.
     let edges = outcome
         .tool_changes
         .iter()
-        .map(|change| kept("edge", &change.after_zone, change.tool_usage, 1.0, -change.tool_usage.ln()));
+        .filter_map(|change| kept("edge", &change.after_zone, change.tool_usage, 1.0, -change.tool_usage.ln()));
     (lives.collect(), edges.collect())
 }
 
@@ -149,18 +250,12 @@ pub(super) fn without(job: &Job, case: &Case) -> Vec<Finding> {
     let mut found = Vec::new();
     for output in Output::ALL {
         let is_asked = if output == Output::ToolLife { of_edges } else { is_limited(output) };
-        if is_asked && job.models.get(output).is_some() && scatter(job, output).is_none() {
+        if is_asked && job.models.get(output).is_some() && scatter(job, output, 1.0).is_none() {
             let at = format!("/models/{}/residual_scatter", output.name());
             found.push(Finding::new("no_scatter_given", at).with("model", output.name()));
         }
     }
     found
-}
-
-/// Standard deviation of single results about an output's model, and whether of their logarithms.
-pub(super) fn scatter(job: &Job, output: Output) -> Option<(f64, bool)> {
-    let model = job.models.get(output)?;
-    Some((model.residual_scatter.filter(|scatter| *scatter > 0.0)?, model.form == ModelForm::LogLog))
 }
 
 fn told<'k>(of: &'static str, least: f64, places: impl Iterator<Item = &'k Kept>) -> Option<Finding> {
@@ -196,17 +291,55 @@ pub(super) fn conformance(job: &Job, case: &Case, outcome: &Outcome) -> Option<S
         return None;
     }
     limits.sort_by(|a, b| a.probability.total_cmp(&b.probability));
-    let joint: f64 = part.iter().map(|kept| (-kept.passed).ln_1p()).sum();
+    let joint = joint(job, &part);
     Some(ScheduleConformance {
         limits,
-        joint_probability: (!part.is_empty()).then(|| bounded(joint.exp())),
+        joint_probability: (!part.is_empty()).then(|| bounded(joint)),
         gain_percent_per_percent_of_risk: None,
         risk_percent: None,
     })
 }
 
-fn bounded(probability: f64) -> f64 {
-    probability.clamp(LEAST, 1.0 - LEAST)
+/// The probability that all limits of a part are kept. Results scatter independently about their models; coefficients that are
+/// uncertain are common to all zones and integrated over.
+fn joint(job: &Job, part: &[Kept]) -> f64 {
+    let lower = |output: Output| {
+        let covariance = job.models.get(output)?.coefficient_covariance.as_ref()?;
+        // A covariance of lower rank gets what round-off leaves of it.
+        let matrix = covariance.as_matrix()?;
+        let share = 1e-12 * matrix.amax();
+        (&matrix + DMatrix::identity(matrix.nrows(), matrix.nrows()) * share).cholesky().map(|found| found.l())
+    };
+    let lowers = Output::ALL.map(lower);
+    if lowers.iter().all(Option::is_none) {
+        return part.iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp();
+    }
+    let sizes = lowers.each_ref().map(|lower| lower.as_ref().map_or(0, DMatrix::nrows));
+    let moved = |kept: &Kept, scores: &[f64]| -> f64 {
+        let output = kept.output as usize;
+        let Some(lower) = &lowers[output] else { return 0.0 };
+        let from: usize = sizes[..output].iter().sum();
+        let Some(covariance) = job.models.get(kept.output).and_then(|model| model.coefficient_covariance.as_ref())
+        else {
+            return 0.0;
+        };
+        let off = lower * DVector::from_column_slice(&scores[from..from + sizes[output]]);
+        let (u, x) = kept.at;
+        let factors = covariance.factors(kept.depth_mm, job.cutting_edge_angle_deg);
+        factors.iter().zip(off.iter()).map(|(by, off)| (by[0] + by[1] * u + by[2] * x) * off).sum()
+    };
+    let mut sum = 0.0;
+    for scores in points(POINTS, sizes.iter().sum(), SEED) {
+        sum += part
+            .iter()
+            .map(|kept| {
+                let residual = job.models.get(kept.output).and_then(|model| model.residual_scatter).unwrap_or(0.0);
+                let left = kept.beyond - moved(kept, &scores);
+                if residual > 0.0 { 1.0 - normal_tail(left / residual) } else { f64::from(u8::from(left >= 0.0)) }
+            })
+            .product::<f64>();
+    }
+    sum / POINTS as f64
 }
 
 /// How many standard deviations lie between what is expected and a limit that is passed with this probability.

@@ -8,4 +8,7 @@ mod library;
 mod model;
 
 pub use library::{LibraryModel, ModelSet, find_set, sets};
-pub use model::{Conditions, FurtherVariable, MachinabilityModel, ModelForm, ModelRange, Variable};
+pub use model::{
+    CoefficientCovariance, Conditions, FurtherVariable, MachinabilityModel, ModelCoefficient, ModelForm, ModelRange,
+    Variable,
+};

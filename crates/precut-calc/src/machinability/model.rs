@@ -1,6 +1,7 @@
 //! One model: a polynomial in logarithms, read as a power law or as it stands.
 
 use crate::material::Certainty;
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -118,6 +119,10 @@ pub struct MachinabilityModel {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.0, maximum = 1e6, example = 0.08, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_res"))))]
     pub residual_scatter: Option<f64>,
+    /// How uncertain the coefficients are, and how they go together; a fit gives it. It acts where a risk is stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-advanced" = json!(true))))]
+    pub coefficient_covariance: Option<CoefficientCovariance>,
     /// Trials behind the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1, maximum = 1_000_000, example = 27, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n"))))]
@@ -129,6 +134,79 @@ pub struct MachinabilityModel {
     /// How certain they are. Changes no number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certainty: Option<Certainty>,
+}
+
+/// How uncertain the coefficients of a model are together (`fit/1.5`): s^2 (X'X)^-1 of a regression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CoefficientCovariance {
+    /// Which coefficients, in the order of rows and columns.
+    #[schema(min_items = 1, max_items = 5, example = json!(["constant", "speed_exponent", "feed_exponent"]))]
+    pub order: Vec<ModelCoefficient>,
+    /// Covariances, row by row; with further variables the constant's are those at their values.
+    #[schema(min_items = 1, max_items = 5, example = json!([[0.28, -0.056, 0.006], [-0.056, 0.013, 0.003], [0.006, 0.003, 0.011]]), extensions(("x-unit" = json!("1"))))]
+    pub matrix: Vec<Vec<f64>>,
+    /// Degrees of freedom of the residuals behind it: limits are then those of Student's t; not said: of the normal distribution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 1e6, example = 9.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("nu"))))]
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// A coefficient of a model, by its field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelCoefficient {
+    /// The constant.
+    Constant,
+    /// That of the speed.
+    SpeedExponent,
+    /// That of the feed.
+    FeedExponent,
+    /// That of the depth of cut.
+    DepthExponent,
+    /// That of the major cutting edge angle.
+    AngleExponent,
+}
+
+impl ModelCoefficient {
+    /// Of a variable.
+    pub fn of(variable: Variable) -> Self {
+        match variable {
+            Variable::Speed => Self::SpeedExponent,
+            Variable::Feed => Self::FeedExponent,
+            Variable::Depth => Self::DepthExponent,
+            Variable::Angle => Self::AngleExponent,
+        }
+    }
+
+    /// What it is multiplied by, as parts of 1, ln V and ln S. An angle that is asked for and absent gives NaN.
+    fn factor(self, depth_mm: f64, cutting_edge_angle_deg: Option<f64>) -> [f64; 3] {
+        match self {
+            Self::Constant => [1.0, 0.0, 0.0],
+            Self::SpeedExponent => [0.0, 1.0, 0.0],
+            Self::FeedExponent => [0.0, 0.0, 1.0],
+            Self::DepthExponent => [depth_mm.ln(), 0.0, 0.0],
+            Self::AngleExponent => [cutting_edge_angle_deg.unwrap_or(f64::NAN).ln(), 0.0, 0.0],
+        }
+    }
+}
+
+impl CoefficientCovariance {
+    /// What every coefficient is multiplied by, as parts of 1, ln V and ln S.
+    pub fn factors(&self, depth_mm: f64, cutting_edge_angle_deg: Option<f64>) -> Vec<[f64; 3]> {
+        self.order.iter().map(|one| one.factor(depth_mm, cutting_edge_angle_deg)).collect()
+    }
+
+    /// The matrix, where it is one: a row and a column for every coefficient, symmetric to 1e-6 of its entries.
+    pub fn as_matrix(&self) -> Option<DMatrix<f64>> {
+        let count = self.order.len();
+        if self.matrix.len() != count || self.matrix.iter().any(|row| row.len() != count) {
+            return None;
+        }
+        let matrix = DMatrix::from_fn(count, count, |i, j| self.matrix[i][j]);
+        let largest = matrix.amax();
+        ((&matrix - matrix.transpose()).amax() <= 1e-6 * largest).then_some(matrix)
+    }
 }
 
 /// A variable beside speed, feed, depth and edge angle, at the value that it has in this job.

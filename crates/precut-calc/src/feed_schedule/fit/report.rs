@@ -9,7 +9,9 @@ use super::output::{
 };
 use super::regression::Fitted;
 use super::sample::{Sample, Source};
-use crate::machinability::{FurtherVariable, MachinabilityModel, ModelForm, ModelRange};
+use crate::machinability::{
+    CoefficientCovariance, FurtherVariable, MachinabilityModel, ModelCoefficient, ModelForm, ModelRange,
+};
 use crate::material::Certainty;
 use crate::num::dense::{Columns, dot};
 use crate::num::hull::distance_to_hull;
@@ -129,7 +131,50 @@ impl Fit<'_> {
             }
         }
         model.range = Some(range);
+        model.coefficient_covariance = self.covariance(&model);
         model
+    }
+
+    /// The covariance of the model's coefficients (`fit/1.5`), with further variables and factors as they stand; `None` where
+    /// the trials leave no degree of freedom.
+    fn covariance(&self, model: &MachinabilityModel) -> Option<CoefficientCovariance> {
+        let linear = &self.fitted().linear;
+        if linear.degrees_of_freedom == 0 {
+            return None;
+        }
+        let mut constant = self.row_of_ones();
+        let mut rows: Vec<(ModelCoefficient, Vec<f64>)> = Vec::new();
+        for (k, term) in self.sample.terms.iter().enumerate() {
+            match (&term.source, known_variable(&term.column)) {
+                (Source::Logarithm { .. }, Some(variable)) => {
+                    let mut unit = vec![0.0; constant.len()];
+                    unit[k + 1] = 1.0;
+                    if self.fitted().terms.contains(&k) {
+                        rows.push((ModelCoefficient::of(variable), self.chosen_row(&unit)));
+                    }
+                }
+                (Source::Logarithm { .. }, None) => {
+                    let stands = model.further.iter().find(|further| further.name == term.column);
+                    constant[k + 1] += stands.map_or(0.0, |further| further.value.ln());
+                }
+                (Source::Level { level }, _) => {
+                    constant[k + 1] = f64::from(u8::from(self.job.at.factors.get(&term.column) == Some(level)));
+                }
+            }
+        }
+        rows.insert(0, (ModelCoefficient::Constant, self.chosen_row(&constant)));
+        let variance = linear.residual_sd().powi(2);
+        let covariance = |a: &[f64], b: &[f64]| {
+            let along = |i: usize| dot(&linear.inverse_gram.row(i), b);
+            variance * a.iter().enumerate().map(|(i, a)| a * along(i)).sum::<f64>()
+        };
+        // Symmetric to the last digit.
+        let entry = |i: usize, j: usize| covariance(&rows[i.min(j)].1, &rows[i.max(j)].1);
+        Some(CoefficientCovariance {
+            order: rows.iter().map(|(coefficient, _)| *coefficient).collect(),
+            matrix: (0..rows.len()).map(|i| (0..rows.len()).map(|j| entry(i, j)).collect()).collect(),
+            degrees_of_freedom: Some(linear.degrees_of_freedom as f64),
+        })
     }
 
     /// Everything that is to be said of the fit.
