@@ -95,6 +95,31 @@ pub(crate) fn answer() -> Result<Measured, String> {
     cpu_time(|| FixtureStability::run(&job, &Unwatched))
 }
 
+/// What an answer takes for the probability of a quiet cut, in a vise with a grip: over the same answer without.
+pub(crate) fn probability(analyses: &[&str]) -> Result<Measured, String> {
+    let job = |uncertainty: Value| {
+        let joint =
+            |stiffness: f64, damping: f64| json!({ "stiffness_n_per_mm": stiffness, "damping_n_s_per_mm": damping });
+        prepared(&json!({
+            "cutter": { "diameter_mm": 63, "teeth": 4 },
+            "force": { "coefficient": 2600, "radial_ratio": 0.4 },
+            "cut": { "width_mm": 40, "depth_mm": 3.11, "spindle_speed_rpm": 1100, "feed_mm_per_tooth": 0.08 },
+            "fixture": {
+                "kind": "self_locking", "workpiece_mass_kg": 4, "clamp_force_n": 2700,
+                "movable_joint": joint(12_000.0, 0.5), "fixed_joint": joint(20_000.0, 0.3),
+                "clamp": { "friction": { "low": 0.13, "value": 0.18, "high": 0.25 }, "force_height_mm": 12, "jaw_length_mm": 125, "jaw_height_mm": 32 }
+            },
+            "analyses": analyses, "uncertainty": uncertainty
+        }))
+    };
+    let plain = job(json!({ "defaults": false }))?;
+    let with = job(json!({}))?;
+    let plain = cpu_time(|| FixtureStability::run(&plain, &Unwatched))?;
+    let with = cpu_time(|| FixtureStability::run(&with, &Unwatched))?;
+    let less = |with: f64| (with - plain.median).max(0.0);
+    Ok(Measured { median: less(with.median), low: less(with.low), high: less(with.high) })
+}
+
 /// The source paper's table of the screw vise: every row predicted under both laws of regeneration.
 fn paper() -> Result<Value, String> {
     let example = FixtureIdentification::META.examples.first().ok_or("no example")?;

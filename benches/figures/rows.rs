@@ -113,6 +113,16 @@ pub(crate) fn all() -> Vec<Row> {
         row("a step of the cut in time, linear force law", Unit::Time, us(0.01), us(0.0067), || fixture::step(0.0)),
         row("a step of the cut in time, power law", Unit::Time, us(0.04), us(0.0167), || fixture::step(0.1)),
         row("complete fixture answer: verdict", Unit::Time, None, None, fixture::answer),
+        row("of a fixture answer its probability: stable, closed and held", Unit::Time, us(50_000.0), None, || {
+            fixture::probability(&[])
+        }),
+        row(
+            "and depths of a probability over 200 speeds, with a robust one",
+            Unit::Time,
+            us(500_000.0),
+            us(150_000.0),
+            || fixture::probability(&["certainty"]),
+        ),
         row("thirty zones, usage and feed steps: solver alone", Unit::Time, us(300.0), us(80.0), || feed::solver(30)),
         row("a hundred zones, the same", Unit::Time, us(1000.0), us(300.0), || feed::solver(100)),
         row("thirty zones through the general conic solver, 1e-8", Unit::Time, us(5000.0), None, || feed::conic(30)),
