@@ -53,10 +53,12 @@ pub(crate) struct Driven<'a> {
     pub(crate) finishing: &'a [usize],
     /// Moves that come out as they are meant: at their places stands what the tool has to be set in for that.
     pub(crate) corrected: &'a BTreeSet<usize>,
-    /// Of a corrected program the one that was given, and of which of its moves every move is a piece: the work bends as
-    /// the part that it means.
-    pub(crate) given: Option<(&'a Program, &'a [usize])>,
+    /// What some moves leave instead of their own way: the work bends as these leave it.
+    pub(crate) bends_as: Option<&'a Instead>,
 }
+
+/// Ways of a tool instead of those of moves, by the moves.
+pub(crate) type Instead = BTreeMap<usize, Vec<(Shape, Way)>>;
 
 /// What a program leaves where work and machine yield.
 #[derive(Debug, Clone)]
@@ -81,35 +83,24 @@ pub(crate) struct Clearance {
     pub(crate) gap_mm: f64,
 }
 
-/// The work as the section of the beam has it: before and after a move of the program that is meant.
+/// The work as the section of the beam has it: before and after a move that does not yield.
 struct Meant {
-    /// Of a corrected program the moves of the given one.
-    given: Option<BTreeMap<usize, (Shape, Way)>>,
-    at: Option<usize>,
     before: Chain,
     after: Chain,
 }
 
 impl Meant {
-    fn of(driven: Driven<'_>, job: &Job, (stock, zero): (&ProgramStock, f64)) -> Self {
-        let given = driven.given.map(|(program, _)| {
-            let feeds = strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed());
-            feeds.map(|stroke| (stroke.index, (stroke.shape, stroke.way))).collect()
-        });
-        Self { given, at: None, before: blank(stock), after: blank(stock) }
-    }
-
-    /// Comes to a move, be it the next one or a further piece of the last.
-    fn come_to(&mut self, stroke: &Stroke<'_>, driven: Driven<'_>) {
-        let mv = driven.given.and_then(|(_, of)| of.get(stroke.index).copied()).unwrap_or(stroke.index);
-        if self.at == Some(mv) {
-            return;
-        }
-        self.at = Some(mv);
+    /// Comes to the next move.
+    fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
         self.before.clone_from(&self.after);
-        let own = (stroke.shape, stroke.way);
-        let (shape, way) = self.given.as_ref().and_then(|given| given.get(&mv)).copied().unwrap_or(own);
-        self.after.turn(&shape, &way, stroke.one.line);
+        match bends_as.and_then(|ways| ways.get(&stroke.index)) {
+            Some(ways) => ways.iter().for_each(|(shape, way)| {
+                self.after.turn(shape, way, stroke.one.line);
+            }),
+            None => {
+                self.after.turn(&stroke.shape, &stroke.way, stroke.one.line);
+            }
+        }
     }
 }
 
@@ -129,7 +120,7 @@ pub(crate) fn yielding(
     driven: Driven<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Yielded, Failure> {
-    let mut meant = Meant::of(driven, job, (stock, zero));
+    let mut meant = Meant { before: blank(stock), after: blank(stock) };
     let mut real = blank(stock);
     let mut yielded = Yielded {
         places: Vec::new(),
@@ -153,11 +144,11 @@ pub(crate) fn yielding(
         if !one.kind.is_feed() {
             continue;
         }
-        meant.come_to(&stroke, driven);
+        meant.come_to(&stroke, driven.bends_as);
         if real.depth_of(shape, way) <= CHIP_MM {
             continue;
         }
-        let acts = acts(job, one.line);
+        let acts = acts(job, program.executed_at(stroke.index));
         if !holding.is_held_by(&acts) {
             return Err(refused("supports_do_not_hold", one.line));
         }

@@ -12,4 +12,4 @@ mod sections;
 
 pub(crate) use contour::{ContourError, contour};
 pub(crate) use cut::{AXIS_MM, CutPlace};
-pub(crate) use drive::{Driven, FAILURE_CODES, PlaceOfMove, Yielded, yielding};
+pub(crate) use drive::{Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};
