@@ -1,5 +1,7 @@
 //! Numbers of the answer.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -293,9 +295,13 @@ impl YieldedWork {
         };
         let all = ends(&mut errors.iter().map(|error| error.error_um));
         let mut lines = ErrorOfLines::default();
+        let mut of_lines: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for error in &errors {
+            let (low, high) = of_lines.entry(error.line).or_insert((error.error_um, error.error_um));
+            (*low, *high) = (low.min(error.error_um), high.max(error.error_um));
+        }
         for &line in finishing {
-            let own = ends(&mut errors.iter().filter(|error| error.line == line).map(|error| error.error_um));
-            if let Some((low, high)) = own {
+            if let Some(&(low, high)) = of_lines.get(&line) {
                 lines.line.push(line);
                 lines.smallest_error_um.push(low);
                 lines.largest_error_um.push(high);
@@ -306,7 +312,7 @@ impl YieldedWork {
             contour.push(error);
         }
         let mut cuts = CutsAlong::default();
-        let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.contains(&line);
+        let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.binary_search(&line).is_ok();
         yielded.places.iter().filter(|of| is_told(of.line)).for_each(|of| cuts.push(of.line, &of.place));
         Self {
             smallest_error_um: all.map(|(low, _)| low),

@@ -71,7 +71,9 @@ fn keeps_mode(moves: &[ProgramMove], before: Option<Speed>) -> bool {
 fn names_what_follows(program: &Program, index: usize) -> bool {
     let Some(at) = (index..program.moves.len()).find(|&at| program.moves[at].kind != Kind::Dwell) else { return true };
     let one = &program.moves[at];
-    if let Some(call) = program.calls.iter().find(|call| call.moves.contains(&at)) {
+    let behind = program.calls.partition_point(|call| call.moves.start <= at);
+    if let Some(call) = behind.checked_sub(1).and_then(|i| program.calls.get(i)).filter(|call| call.moves.contains(&at))
+    {
         return call.names_motion;
     }
     let words = program.words_of_lines.get(&one.line).and_then(Option::as_ref).filter(|words| words.mv == at);

@@ -142,8 +142,10 @@ pub(crate) fn proved(
     let Compared { residual_um, residual_at_mm, transitions } =
         outlines(&task.planned.real, &after.real, jumps, residual_mm)?;
     let errors = contour(&after);
+    // Transitions follow each other along the work.
     let is_counted = |error: &&ContourError| {
-        !transitions.iter().any(|one| (one.from_mm - SAME_MM..=one.to_mm + SAME_MM).contains(&error.z_mm))
+        let next = transitions.partition_point(|one| one.to_mm + SAME_MM < error.z_mm);
+        !transitions.get(next).is_some_and(|one| one.from_mm - SAME_MM <= error.z_mm)
     };
     let ends = |errors: &[ContourError]| {
         let counted = errors.iter().filter(is_counted).map(|error| error.error_um);

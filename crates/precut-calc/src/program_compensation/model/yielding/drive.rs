@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::calculator::{self, Failure, Finding, Monitor};
-use crate::deflection_compensation::{FeedDirection, Holding, ToolPlace};
+use crate::deflection_compensation::{FeedDirection, Holding, Support, Theory, ToolPlace};
 use crate::force::ForceModel;
 
 use super::super::super::job::{Job, ProgramStock};
 use super::super::reader::{Kind, Program};
 use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
-use super::sections::slices;
+use super::sections::{Lumps, slices};
 
 /// Why a program is not driven over a blank that yields.
 pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_hold", "formula_without_value"];
@@ -32,6 +32,8 @@ const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
 /// Steps of the stock that get places of their own.
 const MOST_STEPS: usize = 200;
+/// The work is as its outline has it so far beside the tool, mm.
+const BESIDE_MM: f64 = 1.0;
 /// Multiplications for a place of a move.
 const WORK_OF_PLACE: usize = 20_000;
 /// A feed that climbs by more turns a force law that was measured along the axis, rad.
@@ -157,7 +159,9 @@ pub(crate) fn yielding(
             return Err(refused("speed_missing", one.line));
         }
         let bore_mm = stock.bore_diameter_mm;
-        let held = holding.hold(&slices(&meant.before, &meant.after, bore_mm), &acts, direction(way))?;
+        let lumps = lumps(holding, &meant, way);
+        let held =
+            holding.hold(&slices(&meant.before, &meant.after, bore_mm, lumps.as_ref()), &acts, direction(way))?;
         let cutting = Cutting {
             stroke: &stroke,
             held: &held,
@@ -169,7 +173,7 @@ pub(crate) fn yielding(
             is_corrected: driven.corrected.contains(&stroke.index),
         };
         let is_corrected = cutting.is_corrected;
-        let straight_mm = STRAIGHT_MM[usize::from(!driven.finishing.contains(&one.line))];
+        let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
         let from = cutting.meets_from();
         let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
         let mut places = along.places()?;
@@ -204,6 +208,23 @@ pub(crate) fn yielding(
     yielded.real = real.parts();
     yielded.nominal = meant.after.parts();
     Ok(yielded)
+}
+
+/// Where the work bends as a few slices do: everywhere but about the tool, unless its weight counts, or
+/// shear, or a rest goes with the tool.
+fn lumps(holding: &Holding, meant: &Meant, way: &Way) -> Option<Lumps> {
+    let supports_mm: Option<Vec<f64>> = holding.supports.iter().map(Support::station_mm).collect();
+    let supports_mm = supports_mm?;
+    if holding.weight || holding.shaft.theory == Some(Theory::Timoshenko) {
+        return None;
+    }
+    let [from, to] = way.ends().map(|[x, _]| x);
+    let turned = meant.before.differs_from(&meant.after).unwrap_or([from, from]);
+    // An arc may reach farther than its ends.
+    let beyond = if let Way::Arc { radius, .. } = way { *radius } else { 0.0 };
+    let low = from.min(to).min(turned[0]) - beyond - BESIDE_MM;
+    let high = from.max(to).max(turned[1]) + beyond + BESIDE_MM;
+    Some(Lumps { near_mm: [low, high], supports_mm })
 }
 
 fn refused(code: &'static str, line: usize) -> Failure {
