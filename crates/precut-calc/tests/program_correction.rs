@@ -341,3 +341,63 @@ fn what_acts_at_the_end_goes_to_the_last_piece() {
     assert!(new.len() > 2 && new[0].ends_with(" F0.1 (end)") && new.last().unwrap().ends_with(" M9"), "{new:?}");
     assert_eq!(new.iter().filter(|line| line.contains("M9")).count(), 1);
 }
+
+fn codes(answer: &Answer<Outcome>) -> Vec<&'static str> {
+    answer.warnings.iter().map(|warning| warning.code).collect()
+}
+
+/// A tool that comes where none may is told with its line, and nothing is corrected until it stays out.
+#[test]
+fn a_program_that_runs_into_the_jaws_is_not_corrected() {
+    let program = "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X32. Z2.\nX26.\nG1 Z-290. F0.1\nG0 X100.\nM30\n";
+    let mut job = bar(program, "fanuc_a");
+    job["keep_out"] = json!([{ "z_start_mm": 0, "z_end_mm": 15, "diameter_mm": 120 }]);
+    let answer = try_solve(&compensate(&job)).unwrap();
+    assert!(answer.output.compensation.is_none());
+    let hit = answer.warnings.iter().find(|warning| warning.code == "hits_support").unwrap();
+    assert!(hit.value.unwrap() > 40.0, "{hit:?}");
+    assert!(codes(&answer).contains(&"program_unsafe"));
+    job["nc_program"] = json!(program.replace("Z-290.", "Z-284."));
+    let answer = try_solve(&compensate(&job)).unwrap();
+    assert!(!codes(&answer).contains(&"hits_support"));
+    assert!(!compensation(&answer).lines_changed.is_empty());
+}
+
+/// The least time of a block makes blocks longer, and cuts on small diameters stay as they are.
+#[test]
+fn limits_of_blocks_and_diameters_act() {
+    let mut job =
+        bar("G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X32. Z2.\nX26.\nG1 Z-250. F0.1\nG0 X100.\nM30\n", "fanuc_a");
+    job["force"]["specific_normal_force_n_per_mm2"] = json!(3000);
+    let of = |job: &Value| compensation(&try_solve(job).unwrap()).changes.clone();
+    let mut job = compensate(&job);
+    job["mode"]["chord_tolerance_um"] = json!(0.2);
+    let free = of(&job);
+    // 80 mm/min make 20 mm in 15 s, which no control needs; it shows that the time acts.
+    job["mode"]["min_block_time_ms"] = json!(1000.0);
+    job["mode"]["min_block_length_mm"] = json!(10.0);
+    let longer = of(&job);
+    assert!(free.iter().map(|one| one.new.len()).sum::<usize>() > longer.iter().map(|one| one.new.len()).sum());
+    job["mode"]["minimum_diameter_mm"] = json!(26.5);
+    let answer = try_solve(&job).unwrap();
+    let compensation = compensation(&answer);
+    assert!(compensation.lines_changed.is_empty());
+    assert!(compensation.left_alone.iter().any(|left| left.line == 6 && left.reason == WhyLeftAlone::NearAxis));
+}
+
+/// A nose without compensation leaves a taper thick by what is told.
+#[test]
+fn the_nose_on_a_taper_is_told() {
+    let program =
+        "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X32. Z2.\nX20.\nG1 Z-50. F0.1\nX28. Z-150.\nX31.\nG0 X100.\nM30\n";
+    let answer = try_solve(&bar(program, "fanuc_a")).unwrap();
+    let told = answer.warnings.iter().find(|warning| warning.code == "nose_error_on_taper").unwrap().value.unwrap();
+    // Half way along the taper the program means 24 mm; the normal stands across the slope.
+    let contour = &answer.output.yielding.as_ref().unwrap().contour;
+    let nearest = (0..contour.z_mm.len())
+        .min_by(|&a, &b| (contour.z_mm[a] - 200.0).abs().total_cmp(&(contour.z_mm[b] - 200.0).abs()));
+    let at = nearest.unwrap();
+    let meant = 20.0 + 8.0 * (250.0 - contour.z_mm[at]) / 100.0;
+    let normal = 500.0 * (contour.wanted_diameter_mm[at] - meant) * (0.04_f64).atan().cos();
+    assert!((normal - told).abs() < 0.05, "{normal}, {told}");
+}

@@ -12,8 +12,8 @@ pub use answer::output::{
     Outcome, ReadMoves, Transition, YieldedWork,
 };
 pub use job::{
-    DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
-    ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
+    DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
+    ProgramTool, ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
 };
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
@@ -110,12 +110,15 @@ impl Calculator for ProgramCompensation {
                     None => None,
                 };
                 warnings.extend(advice::warnings(&turned, doubt, (stock, zero, fits)));
+                warnings.extend(advice::nose_on_taper(&program, job, zero, &stock::lines_that_finish(&turned)));
                 Some(turned)
             }
             None => None,
         };
         let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
         warnings.extend(yielded.as_ref().and_then(advice::turned_law));
+        let finishing = turned.as_ref().map(stock::lines_that_finish).unwrap_or_default();
+        warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
         let corrected = corrected(&program, job, turned.as_ref().zip(yielded.as_ref()), monitor)?;
         warnings.extend(corrected.iter().flat_map(advice::of_corrected));
@@ -172,7 +175,7 @@ fn corrected(
 
 /// Whether nothing speaks against a program on its blank.
 fn is_safe(turned: &stock::Turned, stock: &ProgramStock) -> bool {
-    turned.in_stock.is_empty() && stock::doubt(turned, stock).is_none()
+    turned.in_stock.is_empty() && turned.hits.is_empty() && stock::doubt(turned, stock).is_none()
 }
 
 /// The equations that act.

@@ -15,6 +15,8 @@ pub(crate) const CODES: &[&str] = &[
     "tip_not_outside",
     "force_without_stock",
     "compensation_without_force",
+    "keep_out_without_length",
+    "keep_out_without_stock",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -28,6 +30,16 @@ impl Check for Job {
     fn check(&self, violations: &mut Violations) {
         self.check_tools(violations);
         self.check_holding(violations);
+        for (i, keep_out) in self.keep_out.iter().enumerate() {
+            violations.require(keep_out.z_start_mm < keep_out.z_end_mm, || {
+                Finding::new("keep_out_without_length", format!("/keep_out/{i}/z_end_mm"))
+                    .measured(keep_out.z_end_mm, keep_out.z_start_mm, "mm")
+                    .with("above", keep_out.z_start_mm)
+            });
+        }
+        violations.require(self.keep_out.is_empty() || self.stock.is_some(), || {
+            Finding::new("keep_out_without_stock", "/stock")
+        });
         let Some(stock) = &self.stock else { return };
         violations
             .require(self.program_zero_z_mm.is_some(), || Finding::new("program_zero_missing", "/program_zero_z_mm"));

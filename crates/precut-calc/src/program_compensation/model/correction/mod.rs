@@ -78,7 +78,7 @@ pub(crate) fn corrected(
     let feeds = strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed());
     let ways: BTreeMap<usize, Stroke<'_>> = feeds.map(|stroke| (stroke.index, stroke)).collect();
     let calls = Calls::of(program, &ways);
-    let (mut eligible, mut left_alone) = plan::eligible(program, &ways, &calls, &finishing, before);
+    let (mut eligible, mut left_alone) = plan::eligible(program, &ways, &calls, (&finishing, &job.mode), before);
     let found = loop {
         if eligible.is_empty() {
             break None;

@@ -6,13 +6,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::super::super::job::Mode;
-use super::super::reader::{Kind, Program, ProgramMove, WordsOfLine};
+use super::super::reader::{Feed, Kind, Program, ProgramMove, WordsOfLine};
 use super::super::stock::{Stroke, Way};
-use super::super::yielding::{AXIS_MM, Instead, PlaceOfMove, Yielded};
+use super::super::yielding::{AXIS_MM, Instead, Pace, PlaceOfMove, Yielded};
 use super::calls::Calls;
 use super::chords::{Knot, Limits, Wanted, between, chords};
 
 const MM_PER_UM: f64 = 1e-3;
+const MIN_PER_MS: f64 = 1.0 / 60_000.0;
 /// A straight move along the axis by no more makes a face, which keeps its place, mm.
 const FACE_MM: f64 = 1e-9;
 /// Lengths that are no different, mm.
@@ -40,7 +41,7 @@ pub enum WhyLeftAlone {
     Arc,
     /// The next block cannot be made to begin elsewhere.
     Block,
-    /// It comes nearer to the axis than forces are known.
+    /// It comes nearer to the axis than `minimum_diameter_mm`.
     NearAxis,
     /// The work would come out too thin beside a jump of its shift.
     NotSupportedByModel,
@@ -111,7 +112,7 @@ pub(crate) fn eligible(
     program: &Program,
     ways: &BTreeMap<usize, Stroke<'_>>,
     calls: &Calls<'_>,
-    finishing: &[usize],
+    (finishing, mode): (&[usize], &Mode),
     before: &Yielded,
 ) -> (BTreeSet<usize>, Vec<LeftAlone>) {
     let cut: BTreeSet<usize> = before.places.iter().map(|of| of.mv).collect();
@@ -121,7 +122,7 @@ pub(crate) fn eligible(
         if finishing.binary_search(&one.line).is_err() || !cut.contains(&index) {
             continue;
         }
-        match why_not(program, calls, stroke) {
+        match why_not(program, calls, stroke, mode) {
             None => {
                 eligible.insert(index);
             }
@@ -137,7 +138,7 @@ fn is_face(stroke: &Stroke<'_>) -> bool {
     matches!(stroke.way, Way::Line(..)) && (from[0] - to[0]).abs() <= FACE_MM
 }
 
-fn why_not(program: &Program, calls: &Calls<'_>, stroke: &Stroke<'_>) -> Option<WhyLeftAlone> {
+fn why_not(program: &Program, calls: &Calls<'_>, stroke: &Stroke<'_>, mode: &Mode) -> Option<WhyLeftAlone> {
     let (one, index) = (stroke.one, stroke.index);
     let of_line = words(program, one, index);
     if of_line.is_none() && calls.of_move(index).is_none() {
@@ -151,7 +152,7 @@ fn why_not(program: &Program, calls: &Calls<'_>, stroke: &Stroke<'_>) -> Option<
     } else if is_face(stroke) {
         return Some(WhyLeftAlone::Face);
     }
-    if from[1].min(to[1]) < AXIS_MM {
+    if from[1].min(to[1]) < AXIS_MM.max(0.5 * mode.minimum_diameter_mm) {
         return Some(WhyLeftAlone::NearAxis);
     }
     // What follows has to be able to end where it did; a cycle comes back to where it began.
@@ -178,6 +179,8 @@ pub(crate) struct Plan<'a> {
     curves: BTreeMap<usize, Curve>,
     eligible: &'a BTreeSet<usize>,
     limits: Limits,
+    /// Least time of a block, min.
+    min_block_min: f64,
     /// So near to a corner what is wanted counts for it, mm.
     near_mm: f64,
 }
@@ -202,7 +205,16 @@ impl<'a> Plan<'a> {
                 curves.insert(index, Curve::of(stroke, places));
             }
         }
-        Self { program, ways, calls, curves, eligible, limits, near_mm: mode.min_block_length_mm }
+        Self {
+            program,
+            ways,
+            calls,
+            curves,
+            eligible,
+            limits,
+            near_mm: mode.min_block_length_mm,
+            min_block_min: mode.min_block_time_ms * MIN_PER_MS,
+        }
     }
 
     /// Lays jumps of the shift over a longer stretch.
@@ -221,12 +233,26 @@ impl<'a> Plan<'a> {
             if let Some(before) = before.filter(|before| !self.eligible.contains(before) && start.abs() > 0.0) {
                 shifts.ends.insert(before, start);
             }
-            let knots = chords(&curve.points, start, end, self.limits);
+            let knots = chords(&curve.points, start, end, self.limits_of(stroke));
             shifts.jumps.extend(curve.jumps(&knots, self.limits.tolerance, stroke));
             let shares = knots.into_iter().map(|[at, shift]| [at / curve.length_mm, shift]);
             shifts.knots.insert(*index, shares.collect());
         }
         shifts
+    }
+
+    /// The limits with the length that the least time of a block makes at the feed of a move.
+    fn limits_of(&self, stroke: &Stroke<'_>) -> Limits {
+        let pace = Pace { feed: stroke.one.feed, speed: stroke.one.speed };
+        // Where a constant surface speed turns it fastest.
+        let [from, to] = stroke.way.ends();
+        let per_min = match pace.feed {
+            Some(Feed::PerRev(feed)) => pace.rpm(from[1].min(to[1])).map(|rpm| feed * rpm),
+            Some(Feed::PerMinute(feed)) => Some(feed),
+            None => None,
+        };
+        let of_time = per_min.map_or(0.0, |feed| feed * self.min_block_min);
+        Limits { shortest: self.limits.shortest.max(of_time), ..self.limits }
     }
 
     /// Whether the next move of the program begins where this one ends, with the same tool.

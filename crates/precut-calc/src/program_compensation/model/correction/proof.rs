@@ -131,6 +131,11 @@ pub(crate) fn proved(
             return Err(Failed::Part { part: "rapid", line, off_um: UM_PER_MM * (one.depth_mm - old) });
         }
     }
+    // A program that comes there as it is was not corrected.
+    if let Some(hit) = driven_rigid.hits.first() {
+        let line = written.given_line(hit.line);
+        return Err(Failed::Part { part: "keep_out", line, off_um: UM_PER_MM * hit.depth_mm });
+    }
     let finishing = lines_that_finish(&driven_rigid);
     let of = written.moves();
     let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
