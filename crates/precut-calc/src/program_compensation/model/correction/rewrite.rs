@@ -310,9 +310,9 @@ impl Line<'_> {
         }
         if let Some(line) = lines.last_mut() {
             let blank = if self.has_blanks() { " " } else { "" };
-            at_end.iter().for_each(|range| {
+            for range in at_end {
                 let _ = write!(line, "{blank}{}", &self.text[range.clone()]);
-            });
+            }
         }
         (!(is_same && rest.is_empty())).then_some((lines, last))
     }
@@ -326,7 +326,7 @@ impl Line<'_> {
     /// Centre of a piece of an arc that is told by a centre, in numbers that can be written: as near as may be to where it is as far
     /// from both ends as before.
     fn centre(&self, from: Point, to: Point) -> Option<Point> {
-        let [cx, cz] = self.one.centre.filter(|_| self.words.has_centre)?;
+        let [cx, cz] = self.one.centre.filter(|_| self.words.centre.iter().any(Option::is_some))?;
         let end = self.one.end.known()?;
         let radius = (0.5 * (end[0] - cx)).hypot(end[1] - cz);
         let point = |[x, z]: Point| [0.5 * x, z];

@@ -29,7 +29,6 @@ impl Written {
             x: None,
             z: None,
             radius: None,
-            has_centre: false,
             centre: [None, None],
             is_centre_absolute: false,
             put_in_at: range.start,

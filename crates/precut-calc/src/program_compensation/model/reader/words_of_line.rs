@@ -31,8 +31,7 @@ pub(crate) struct WordsOfLine {
     pub(crate) z: Option<NumberInText>,
     /// The word of the radius of an arc.
     pub(crate) radius: Option<Range<usize>>,
-    /// Whether its arc is told by a centre, and the words of that along the radius and along the axis.
-    pub(crate) has_centre: bool,
+    /// The words of the centre of an arc that is told by one: along the radius and along the axis.
     pub(crate) centre: [Option<NumberInText>; 2],
     /// Whether a centre counts from program zero unless its words say otherwise.
     pub(crate) is_centre_absolute: bool,
@@ -113,7 +112,6 @@ impl<'a> Reader<'a> {
             x: x.and_then(|word| self.number_of(word, Axis::X)),
             z: z.and_then(|word| self.number_of(word, Axis::Z)),
             radius: radius.map(in_text),
-            has_centre: by_letter(b'I').is_some() || by_letter(b'K').is_some(),
             centre: [b'I', b'K'].map(|letter| by_letter(letter).and_then(|word| self.number_of(word, Axis::Centre))),
             is_centre_absolute: self.state.centre_absolute,
             put_in_at,
