@@ -9,6 +9,7 @@ use precut_calc::program_compensation::{CompensatedProgram, ErrorAlong, Outcome,
 use serde_json::{Value, json};
 
 use crate::draw::Draw;
+use crate::program_reading::number;
 use crate::program_yielding::{DIALECTS, cases, job_of, shaft, try_solve};
 
 /// Chord tolerance and increment, on the radius, um.
@@ -400,4 +401,37 @@ fn the_nose_on_a_taper_is_told() {
     let meant = 20.0 + 8.0 * (250.0 - contour.z_mm[at]) / 100.0;
     let normal = 500.0 * (contour.wanted_diameter_mm[at] - meant) * (0.04_f64).atan().cos();
     assert!((normal - told).abs() < 0.05, "{normal}, {told}");
+}
+
+/// What the program means against what the drawing asks for is told, and left as it is.
+#[test]
+fn a_program_off_its_drawing_is_told() {
+    let program = "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X32. Z2.\nX26.\nG1 Z-250. F0.1\nG0 X100.\nM30\n";
+    let mut job = bar(program, "fanuc_a");
+    let plain = try_solve(&compensate(&job)).unwrap();
+    job["drawing"] = json!([
+        { "z_mm": 100, "diameter_mm": 25.98 }, { "z_mm": 200, "diameter_mm": 25.98 },
+        { "z_mm": 200, "diameter_mm": 26.01 }, { "z_mm": 280, "diameter_mm": 26.01 },
+    ]);
+    let answer = try_solve(&compensate(&job)).unwrap();
+    let drawing = answer.output.drawing.as_ref().unwrap();
+    assert!(drawing.z_mm.iter().all(|z| (100.0..=280.0).contains(z)) && drawing.z_mm.len() > 20);
+    for (z, error) in drawing.z_mm.iter().zip(&drawing.program_error_um) {
+        assert!((error - if *z < 200.0 { 20.0 } else { -10.0 }).abs() < 1e-6, "{z} {error}");
+    }
+    assert_eq!(plain.output.compensation, answer.output.compensation);
+    assert!(answer.explanation.iter().any(|said| said.code == "program_off_drawing"));
+}
+
+/// Ways through the air and cuts that find nothing are told with their lines.
+#[test]
+fn what_cuts_nothing_is_told() {
+    let program =
+        "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X32. Z42.\nX26.\nG1 Z-250. F0.1\nG1 X40.\nZ10.\nG0 X100.\nM30\n";
+    let answer = try_solve(&bar(program, "fanuc_a")).unwrap();
+    let told = answer.warnings.iter().find(|warning| warning.code == "plunge_at_feed_in_air").unwrap();
+    // The way back at 40 mm: 260 mm at 80 mm/min.
+    assert!((told.value.unwrap() - 260.0).abs() < 1e-9, "{told:?}");
+    assert!((number(told, "time_s") - 195.0).abs() < 1e-6, "{told:?}");
+    assert!(!codes(&answer).contains(&"no_cut"));
 }

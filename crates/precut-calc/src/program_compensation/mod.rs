@@ -9,7 +9,7 @@ mod model;
 
 pub use answer::output::{
     CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
-    Outcome, ReadMoves, Transition, YieldedWork,
+    Outcome, ProgramError, ReadMoves, Transition, YieldedWork,
 };
 pub use job::{
     DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
@@ -117,6 +117,7 @@ impl Calculator for ProgramCompensation {
         };
         let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
         warnings.extend(yielded.as_ref().and_then(advice::turned_law));
+        warnings.extend(yielded.iter().flat_map(advice::of_nothing_cut));
         let finishing = turned.as_ref().map(stock::lines_that_finish).unwrap_or_default();
         warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
@@ -125,7 +126,7 @@ impl Calculator for ProgramCompensation {
         if job.mode.kind == ModeKind::Compensate && corrected.is_none() {
             warnings.push(Finding::new("program_unsafe", "/nc_program"));
         }
-        let output = output::outcome(&program, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
+        let output = output::outcome(&program, &job.drawing, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })

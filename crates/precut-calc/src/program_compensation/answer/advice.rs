@@ -24,6 +24,8 @@ pub(crate) const WARNING_CODES: &[&str] = &[
     "rapid_in_stock",
     "hits_support",
     "deflection_over_depth",
+    "no_cut",
+    "plunge_at_feed_in_air",
     "nose_error_on_taper",
     "nothing_cut",
     "cut_implausible",
@@ -39,6 +41,7 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "cycles_expanded",
     "stretches_passed",
     "surface_left",
+    "program_off_drawing",
     "error_along_contour",
     "program_corrected",
     "jumps_left_thick",
@@ -62,6 +65,11 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     }
     if let Some(surface) = &outcome.surface {
         said.push(Message::new("surface_left").with("lines", surface.finishing_lines.len()));
+    }
+    if let Some(drawing) = &outcome.drawing
+        && let Some(largest) = drawing.program_error_um.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    {
+        said.push(Message::new("program_off_drawing").with("largest_um", largest));
     }
     if let Some(yielding) = &outcome.yielding
         && let Some((smallest, largest)) = yielding.smallest_error_um.zip(yielding.largest_error_um)
@@ -122,6 +130,22 @@ pub(crate) fn off_by_more_than_deep(yielded: &Yielded, finishing: &[usize]) -> O
         yielded.places.iter().filter(|of| is_finishing(of.line)).filter(is_off).map(|of| of.line).collect();
     let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
     (!lines.is_empty()).then(|| Finding::new("deflection_over_depth", "/nc_program").with("lines", lines))
+}
+
+/// Lines that find nothing to cut, and long ways at the feed through the air.
+pub(crate) fn of_nothing_cut(yielded: &Yielded) -> Vec<Finding> {
+    let lines: Vec<usize> = yielded.missed_lines.iter().copied().take(MOST_LINES).collect();
+    let missed = (!lines.is_empty()).then(|| Finding::new("no_cut", "/nc_program").with("lines", lines));
+    let in_air = yielded.in_air.iter().take(MOST_LINES).map(|one| {
+        let finding = Finding::new("plunge_at_feed_in_air", "/nc_program")
+            .measured(one.length_mm, 0.0, "mm")
+            .with("line", one.line);
+        match one.time_min {
+            Some(time_min) => finding.with("time_s", 60.0 * time_min),
+            None => finding,
+        }
+    });
+    missed.into_iter().chain(in_air).collect()
 }
 
 /// Finishing lines on which the nose leaves more or less than the program says, because it runs without compensation along a

@@ -17,6 +17,7 @@ pub(crate) const CODES: &[&str] = &[
     "compensation_without_force",
     "keep_out_without_length",
     "keep_out_without_stock",
+    "drawing_without_stock",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -37,6 +38,9 @@ impl Check for Job {
                     .with("above", keep_out.z_start_mm)
             });
         }
+        violations.require(self.drawing.is_empty() || self.stock.is_some(), || {
+            Finding::new("drawing_without_stock", "/stock")
+        });
         violations.require(self.keep_out.is_empty() || self.stock.is_some(), || {
             Finding::new("keep_out_without_stock", "/stock")
         });
@@ -47,6 +51,13 @@ impl Check for Job {
         for (i, pair) in stock.profile.windows(2).enumerate() {
             violations.require(pair[0].z_mm <= pair[1].z_mm, || {
                 Finding::new("profile_falls_back", format!("/stock/profile/{}/z_mm", i + 1))
+                    .measured(pair[1].z_mm, pair[0].z_mm, "mm")
+                    .with("minimum", pair[0].z_mm)
+            });
+        }
+        for (i, pair) in self.drawing.windows(2).enumerate() {
+            violations.require(pair[0].z_mm <= pair[1].z_mm, || {
+                Finding::new("profile_falls_back", format!("/drawing/{}/z_mm", i + 1))
                     .measured(pair[1].z_mm, pair[0].z_mm, "mm")
                     .with("minimum", pair[0].z_mm)
             });

@@ -33,6 +33,11 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("workpiece"))))]
     pub stock: Option<ProgramStock>,
+    /// The part of the drawing from the headstock end; a place twice is a step. With it the answer says how far the program is off it on
+    /// work and machine that do not yield; it is never corrected to it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 1000, extensions(("x-group" = json!("workpiece")), ("x-advanced" = json!(true))))]
+    pub drawing: Vec<StockRow>,
     /// The tools that cut. Needed with `stock`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 100, extensions(("x-group" = json!("cut"))))]

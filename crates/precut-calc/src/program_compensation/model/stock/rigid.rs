@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::calculator::{Failure, Finding, Monitor, Pace};
 
-use super::super::super::job::{Job, KeepOut, ProgramStock, ProgramTool};
+use super::super::super::job::{Job, KeepOut, ProgramStock, ProgramTool, StockRow};
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
@@ -185,7 +185,12 @@ pub(crate) fn strokes<'p>(program: &'p Program, job: &'p Job, zero: f64) -> impl
 
 /// The outline of a blank.
 pub(crate) fn blank(stock: &ProgramStock) -> Chain {
-    let rows: Vec<[f64; 2]> = stock.profile.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
+    outline(&stock.profile)
+}
+
+/// An outline of places and diameters.
+pub(crate) fn outline(rows: &[StockRow]) -> Chain {
+    let rows: Vec<[f64; 2]> = rows.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
     Chain::of(&rows)
 }
 

@@ -32,6 +32,9 @@ const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
 /// Steps of the stock that get places of their own.
 const MOST_STEPS: usize = 200;
+/// A cut that is meant is deeper, and a move through the air that is told longer, mm.
+const MEANT_MM: f64 = 1e-3;
+const AIR_MM: f64 = 20.0;
 /// The work is as its outline has it so far beside the tool, mm.
 const BESIDE_MM: f64 = 1.0;
 /// Multiplications for a place of a move.
@@ -74,6 +77,19 @@ pub(crate) struct Yielded {
     pub(crate) nominal: Vec<Part>,
     /// Lines that cut in another direction than the force law was measured in.
     pub(crate) turned_lines: BTreeSet<usize>,
+    /// Lines that mean to cut and find nothing left to cut.
+    pub(crate) missed_lines: BTreeSet<usize>,
+    /// Long moves at the feed that cut nothing and do not mean to.
+    pub(crate) in_air: Vec<InAir>,
+}
+
+/// A move at the feed through the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct InAir {
+    pub(crate) line: usize,
+    pub(crate) length_mm: f64,
+    /// None where the speed is not known.
+    pub(crate) time_min: Option<f64>,
 }
 
 /// How far a rapid move stays off the work, across the axis.
@@ -130,6 +146,8 @@ pub(crate) fn yielding(
         real: Vec::new(),
         nominal: Vec::new(),
         turned_lines: BTreeSet::new(),
+        missed_lines: BTreeSet::new(),
+        in_air: Vec::new(),
     };
     let mut so_far = SoFar::default();
     // The last move that was still cutting when it ended.
@@ -148,6 +166,7 @@ pub(crate) fn yielding(
         }
         meant.come_to(&stroke, driven.bends_as);
         if real.depth_of(shape, way) <= CHIP_MM {
+            yielded.find_nothing(&stroke, meant.before.depth_of(shape, way));
             continue;
         }
         let acts = acts(job, program.executed_at(stroke.index));
@@ -225,6 +244,22 @@ fn lumps(holding: &Holding, meant: &Meant, way: &Way) -> Option<Lumps> {
     let low = from.min(to).min(turned[0]) - beyond - BESIDE_MM;
     let high = from.max(to).max(turned[1]) + beyond + BESIDE_MM;
     Some(Lumps { near_mm: [low, high], supports_mm })
+}
+
+impl Yielded {
+    /// Keeps a move at the feed that cuts nothing, with the depth that it would have, did nothing yield.
+    fn find_nothing(&mut self, stroke: &Stroke<'_>, meant_mm: f64) {
+        let (line, length_mm) = (stroke.one.line, stroke.way.length_mm());
+        if meant_mm > MEANT_MM {
+            self.missed_lines.insert(line);
+        } else if length_mm > AIR_MM {
+            let pace = Pace { feed: stroke.one.feed, speed: stroke.one.speed };
+            let radius_mm = stroke.way.at(0.5)[1].max(AXIS_MM);
+            let per_min = pace.feed_mm_per_rev(radius_mm).zip(pace.rpm(radius_mm)).map(|(feed, rpm)| feed * rpm);
+            let time_min = per_min.filter(|per_min| *per_min > 0.0).map(|per_min| length_mm / per_min);
+            self.in_air.push(InAir { line, length_mm, time_min });
+        }
+    }
 }
 
 fn refused(code: &'static str, line: usize) -> Failure {
