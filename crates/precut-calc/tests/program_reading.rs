@@ -43,7 +43,7 @@ fn job_of(case: &Value) -> Value {
     job(case["program"].as_str().unwrap(), case["dialect"].as_str().unwrap(), &reading)
 }
 
-fn number(finding: &Finding, name: &str) -> f64 {
+pub(crate) fn number(finding: &Finding, name: &str) -> f64 {
     match finding.values.get(name) {
         Some(Said::Number(number)) => *number,
         other => panic!("{name}: {other:?}"),

@@ -55,6 +55,9 @@ fn warned(answer: &Answer<Outcome>) -> Vec<&'static str> {
     answer.warnings.iter().map(|warning| warning.code).collect()
 }
 
+/// What may be said of the reference programs: they cut tapers without compensation of the nose.
+const KNOWN: [&str; 2] = ["unknown_m", "nose_error_on_taper"];
+
 #[test]
 fn the_reference_programs_leave_what_they_should() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/program-compensation/simulation.json");
@@ -75,7 +78,7 @@ fn the_reference_programs_leave_what_they_should() {
             "tools": tools.collect::<Vec<_>>(),
         }));
         assert_eq!(json!(surface(&answer).finishing_lines), expected["finishing_lines"], "{name}");
-        assert_eq!(warned(&answer).iter().filter(|code| **code != "unknown_m").count(), 0, "{name}");
+        assert_eq!(warned(&answer).iter().filter(|code| !KNOWN.contains(code)).count(), 0, "{name}");
         for row in expected["surface"].as_array().unwrap() {
             let (z, wanted) = (row["z_mm"].as_f64().unwrap(), row["wanted_diameter_mm"].as_f64().unwrap());
             let (diameter, line) = at(surface(&answer), z);

@@ -334,3 +334,42 @@ fn half_the_force_makes_half_the_error() {
         assert!((half / whole - 0.5).abs() < 0.02, "{seed}: {whole}, {half}");
     }
 }
+
+/// A shaft of so many lines: a wave along the work, roughed and finished.
+pub(crate) fn wave(lines: usize) -> Value {
+    let mut job = shaft(&mut Draw::new(950), "fanuc_a");
+    let mut text = "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X50. Z2.\n".to_owned();
+    for (allowance, feed) in [(1.0, 0.25), (0.0, 0.1)] {
+        let _ = writeln!(text, "G0 Z2.\nX{:.3}\nG1 F{feed}", 24.0 + allowance);
+        let count = lines / 2;
+        for i in 0..=count {
+            let z = -380.0 * i as f64 / count as f64;
+            let _ = writeln!(text, "X{:.3} Z{z:.3}", 24.0 + allowance + (-z / 30.0).sin() - 0.01 * z);
+        }
+        text += "X50.\n";
+    }
+    text += "G0 X60.\nM30\n";
+    job["nc_program"] = json!(text);
+    job["program_zero_z_mm"] = json!(400);
+    job["stock"]["profile"] = json!([{ "z_mm": 0, "diameter_mm": 32 }, { "z_mm": 400, "diameter_mm": 32 }]);
+    job["supports"][1]["z_mm"] = json!(400);
+    job["tools"][0]["minor_edge_angle_deg"] = json!(32);
+    job
+}
+
+/// What a line costs does not depend on how many there are: twice the lines, twice the places.
+#[test]
+fn long_programs_bend_as_short_ones_do() {
+    let of = |lines: usize| solve(&wave(lines));
+    let (short, long) = (of(60), of(600));
+    let (short, long) = (&yielding(&short).contour, &yielding(&long).contour);
+    let mut compared = 0;
+    for (z, error) in short.z_mm.iter().zip(&short.diameter_error_um) {
+        // Beside the chuck nothing is left to bend, and the long one follows the wave more closely.
+        if let Some(other) = between(&long.z_mm, &long.diameter_error_um, *z).filter(|_| (40.0..390.0).contains(z)) {
+            assert!((other - error).abs() < 0.35, "{z}: {error}, {other}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 60, "{compared}");
+}

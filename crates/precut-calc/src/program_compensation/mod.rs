@@ -9,11 +9,11 @@ mod model;
 
 pub use answer::output::{
     CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
-    Outcome, ReadMoves, Transition, YieldedWork,
+    Outcome, ProgramError, ReadMoves, Transition, YieldedWork,
 };
 pub use job::{
-    DecimalPoint, Dialect, Job, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
-    ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
+    DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
+    ProgramTool, ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
 };
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -84,10 +84,10 @@ impl Calculator for ProgramCompensation {
         let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
         // Over a blank a move is held against what it comes near to, however long the program is (measured).
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
-        // Where the work yields, every move bends a beam of as many sections as the outline has parts by then.
-        let yielding_ms = if job.force.is_some() { 0.12 * lines as f64 + 4e-4 * (lines as f64).powi(2) } else { 0.0 };
+        // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
+        let yielding_ms = if job.force.is_some() { 0.2 * lines as f64 } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
-        let drives = if job.mode.kind == ModeKind::Compensate { 4.0 } else { 1.0 };
+        let drives = if job.mode.kind == ModeKind::Compensate { 3.0 } else { 1.0 };
         Cost {
             ms: read_ms + drives * (turned_ms + yielding_ms),
             // A line makes four moves at most; cycles over a contour make some more.
@@ -110,19 +110,23 @@ impl Calculator for ProgramCompensation {
                     None => None,
                 };
                 warnings.extend(advice::warnings(&turned, doubt, (stock, zero, fits)));
+                warnings.extend(advice::nose_on_taper(&program, job, zero, &stock::lines_that_finish(&turned)));
                 Some(turned)
             }
             None => None,
         };
         let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
         warnings.extend(yielded.as_ref().and_then(advice::turned_law));
+        warnings.extend(yielded.iter().flat_map(advice::of_nothing_cut));
+        let finishing = turned.as_ref().map(stock::lines_that_finish).unwrap_or_default();
+        warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
         let corrected = corrected(&program, job, turned.as_ref().zip(yielded.as_ref()), monitor)?;
         warnings.extend(corrected.iter().flat_map(advice::of_corrected));
         if job.mode.kind == ModeKind::Compensate && corrected.is_none() {
             warnings.push(Finding::new("program_unsafe", "/nc_program"));
         }
-        let output = output::outcome(&program, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
+        let output = output::outcome(&program, &job.drawing, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
@@ -148,7 +152,7 @@ fn yielded(
     let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
     monitor.progress(0.5, Message::new("stage_yielding"));
     let finishing = stock::lines_that_finish(turned);
-    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), given: None };
+    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
     yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
 }
 
@@ -172,7 +176,7 @@ fn corrected(
 
 /// Whether nothing speaks against a program on its blank.
 fn is_safe(turned: &stock::Turned, stock: &ProgramStock) -> bool {
-    turned.in_stock.is_empty() && stock::doubt(turned, stock).is_none()
+    turned.in_stock.is_empty() && turned.hits.is_empty() && stock::doubt(turned, stock).is_none()
 }
 
 /// The equations that act.

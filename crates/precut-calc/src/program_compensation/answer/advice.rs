@@ -1,21 +1,32 @@
 //! What is said of a program.
 
+use std::collections::BTreeSet;
+
 use crate::calculator::{Finding, Message};
 
-use super::super::job::ProgramStock;
+use super::super::job::{Job, ProgramStock};
 use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
-use super::super::model::stock::{Doubt, Turned, implausible_mm};
-use super::super::model::yielding::Yielded;
+use super::super::model::reader::{Kind, Nose, Program};
+use super::super::model::stock::{Doubt, Stroke, Turned, implausible_mm, strokes};
+use super::super::model::yielding::{PlaceOfMove, Yielded};
 use super::output::{CompensatedProgram, Outcome};
 
 /// Rapid moves that are told.
 const MOST_RAPIDS: usize = 100;
+/// A thinner chip is none, and a nose that stands off by less is not told, mm.
+const CHIP_MM: f64 = 1e-3;
+const NOSE_MM: f64 = 5e-4;
 /// Lines that one warning names.
 const MOST_LINES: usize = 20;
 
 /// What may be wrong with a program on its blank.
 pub(crate) const WARNING_CODES: &[&str] = &[
     "rapid_in_stock",
+    "hits_support",
+    "deflection_over_depth",
+    "no_cut",
+    "plunge_at_feed_in_air",
+    "nose_error_on_taper",
     "nothing_cut",
     "cut_implausible",
     "force_law_turned",
@@ -30,6 +41,7 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "cycles_expanded",
     "stretches_passed",
     "surface_left",
+    "program_off_drawing",
     "error_along_contour",
     "program_corrected",
     "jumps_left_thick",
@@ -53,6 +65,11 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     }
     if let Some(surface) = &outcome.surface {
         said.push(Message::new("surface_left").with("lines", surface.finishing_lines.len()));
+    }
+    if let Some(drawing) = &outcome.drawing
+        && let Some(largest) = drawing.program_error_um.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    {
+        said.push(Message::new("program_off_drawing").with("largest_um", largest));
     }
     if let Some(yielding) = &outcome.yielding
         && let Some((smallest, largest)) = yielding.smallest_error_um.zip(yielding.largest_error_um)
@@ -104,7 +121,62 @@ pub(crate) fn turned_law(yielded: &Yielded) -> Option<Finding> {
     (!lines.is_empty()).then(|| Finding::new("force_law_turned", "/force").with("lines", lines))
 }
 
-/// Rapid moves through stock, and a blank that does not go with the program; `fits` is a program zero that would.
+/// Finishing lines whose cut is pushed off by more than it is deep, which no shift mends for good.
+pub(crate) fn off_by_more_than_deep(yielded: &Yielded, finishing: &[usize]) -> Option<Finding> {
+    let is_finishing = |line: usize| finishing.binary_search(&line).is_ok();
+    let is_off =
+        |of: &&PlaceOfMove| of.place.nominal_depth_mm > CHIP_MM && of.place.lift_mm > of.place.nominal_depth_mm;
+    let lines: BTreeSet<usize> =
+        yielded.places.iter().filter(|of| is_finishing(of.line)).filter(is_off).map(|of| of.line).collect();
+    let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
+    (!lines.is_empty()).then(|| Finding::new("deflection_over_depth", "/nc_program").with("lines", lines))
+}
+
+/// Lines that find nothing to cut, and long ways at the feed through the air.
+pub(crate) fn of_nothing_cut(yielded: &Yielded) -> Vec<Finding> {
+    let lines: Vec<usize> = yielded.missed_lines.iter().copied().take(MOST_LINES).collect();
+    let missed = (!lines.is_empty()).then(|| Finding::new("no_cut", "/nc_program").with("lines", lines));
+    let in_air = yielded.in_air.iter().take(MOST_LINES).map(|one| {
+        let finding = Finding::new("plunge_at_feed_in_air", "/nc_program")
+            .measured(one.length_mm, 0.0, "mm")
+            .with("line", one.line);
+        match one.time_min {
+            Some(time_min) => finding.with("time_s", 60.0 * time_min),
+            None => finding,
+        }
+    });
+    missed.into_iter().chain(in_air).collect()
+}
+
+/// Finishing lines on which the nose leaves more or less than the program says, because it runs without compensation along a
+/// taper: by the imaginary tip the surface stands off by r (cos a + sin a - 1), normal to it.
+pub(crate) fn nose_on_taper(program: &Program, job: &Job, zero: f64, finishing: &[usize]) -> Option<Finding> {
+    let off_mm = |stroke: &Stroke<'_>| {
+        let [from, to] = stroke.way.ends();
+        let is_taper = stroke.one.kind == Kind::Line && (from[0] - to[0]).abs() > 0.0 && (from[1] - to[1]).abs() > 0.0;
+        // The tip of the tool leads along the axis where it cuts toward the headstock, or as a left-hand tool away from it.
+        let leads = match stroke.tool.tip_direction {
+            3 => -1.0,
+            4 => 1.0,
+            _ => return None,
+        };
+        let angle = ((to[1] - from[1]) / (to[0] - from[0]) * leads).atan();
+        (is_taper && stroke.one.nose == Nose::Off)
+            .then(|| stroke.shape.nose * (angle.cos() + angle.sin() - 1.0))
+            .filter(|off| off.abs() > NOSE_MM)
+    };
+    let is_finishing = |stroke: &Stroke<'_>| finishing.binary_search(&stroke.one.line).is_ok();
+    let found: Vec<(usize, f64)> = strokes(program, job, zero)
+        .filter(|stroke| is_finishing(stroke))
+        .filter_map(|stroke| Some((stroke.one.line, off_mm(&stroke)?)))
+        .collect();
+    let worst = found.iter().map(|(_, off)| *off).max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let lines: BTreeSet<usize> = found.iter().map(|(line, _)| *line).collect();
+    let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
+    Some(Finding::new("nose_error_on_taper", "/nc_program").measured(1e3 * worst, 0.0, "um").with("lines", lines))
+}
+
+/// Rapid moves through stock, moves where no tool may come, and a blank that does not go with the program; `fits` is a program zero that would.
 pub(crate) fn warnings(
     turned: &Turned,
     doubt: Option<Doubt>,
@@ -112,6 +184,11 @@ pub(crate) fn warnings(
 ) -> Vec<Finding> {
     let rapid = turned.in_stock.iter().take(MOST_RAPIDS).map(|one| {
         Finding::new("rapid_in_stock", "/nc_program").measured(one.depth_mm, 0.0, "mm").with("line", one.line)
+    });
+    let hits = turned.hits.iter().take(MOST_RAPIDS).map(|one| {
+        Finding::new("hits_support", format!("/keep_out/{}", one.place))
+            .measured(one.depth_mm, 0.0, "mm")
+            .with("line", one.line)
     });
     let and_fits = |finding: Finding| match fits {
         Some(fits) => finding.with("fits_z_mm", fits),
@@ -125,5 +202,5 @@ pub(crate) fn warnings(
                 .with("line", cut.line),
         ),
     });
-    doubt.into_iter().chain(rapid).collect()
+    doubt.into_iter().chain(rapid).chain(hits).collect()
 }

@@ -1,12 +1,15 @@
 //! Numbers of the answer.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::super::job::StockRow;
 use super::super::model::correction::{ChangedLine, Corrected, Proof, Transition as ThickStretch, WhyLeftAlone};
 use super::super::model::reader::{ContourCycle, Feed, Kind, Nose, Program, ProgramMove, Speed};
-use super::super::model::stock::{Curve, Turned, lines_that_finish};
-use super::super::model::yielding::{ContourError, CutPlace, Yielded, contour};
+use super::super::model::stock::{Curve, Part, Piece, Turned, lines_that_finish, outline};
+use super::super::model::yielding::{ContourError, CutPlace, Yielded, between, contour};
 
 /// What a program makes the machine do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -35,10 +38,47 @@ pub struct Outcome {
     pub moves: ReadMoves,
     /// What the program leaves of the blank on work and machine that do not yield; null without a blank.
     pub surface: Option<LeftSurface>,
+    /// How far that is off the part of the drawing; null without a drawing.
+    pub drawing: Option<ProgramError>,
     /// What it leaves where work and machine yield; null without a force law.
     pub yielding: Option<YieldedWork>,
     /// The program that leaves no error; null where it was not asked for.
     pub compensation: Option<CompensatedProgram>,
+}
+
+/// What a program leaves on work and machine that do not yield, against the part of the drawing, by columns.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ProgramError {
+    /// Place from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: Vec<f64>,
+    /// Diameter of the drawing.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub drawing_diameter_mm: Vec<f64>,
+    /// By how much the diameter of the program is larger.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub program_error_um: Vec<f64>,
+    /// Line that makes the surface there, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+}
+
+impl ProgramError {
+    fn of(turned: &Turned, rows: &[StockRow]) -> Option<Self> {
+        let drawing = outline(rows).parts();
+        let (first, last) = drawing.first().zip(drawing.last())?;
+        let (from, to) = (first.piece.x0, last.piece.x1);
+        let part = |&(piece, owner): &(Piece, Option<usize>)| Part { piece, owner, step_owner: None };
+        let made: Vec<Part> = turned.parts.iter().map(part).collect();
+        let mut error = Self::default();
+        for at in between(&made, &drawing).into_iter().filter(|at| (from..=to).contains(&at.z_mm)) {
+            error.z_mm.push(at.z_mm);
+            error.drawing_diameter_mm.push(at.diameter_mm + at.error_um / UM_PER_MM);
+            error.program_error_um.push(-at.error_um);
+            error.line.push(at.line);
+        }
+        Some(error)
+    }
 }
 
 /// A program whose finishing cuts are shifted against what they would leave.
@@ -293,9 +333,13 @@ impl YieldedWork {
         };
         let all = ends(&mut errors.iter().map(|error| error.error_um));
         let mut lines = ErrorOfLines::default();
+        let mut of_lines: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for error in &errors {
+            let (low, high) = of_lines.entry(error.line).or_insert((error.error_um, error.error_um));
+            (*low, *high) = (low.min(error.error_um), high.max(error.error_um));
+        }
         for &line in finishing {
-            let own = ends(&mut errors.iter().filter(|error| error.line == line).map(|error| error.error_um));
-            if let Some((low, high)) = own {
+            if let Some(&(low, high)) = of_lines.get(&line) {
                 lines.line.push(line);
                 lines.smallest_error_um.push(low);
                 lines.largest_error_um.push(high);
@@ -306,7 +350,7 @@ impl YieldedWork {
             contour.push(error);
         }
         let mut cuts = CutsAlong::default();
-        let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.contains(&line);
+        let is_told = |line: usize| yielded.places.len() <= MOST_PLACES || finishing.binary_search(&line).is_ok();
         yielded.places.iter().filter(|of| is_told(of.line)).for_each(|of| cuts.push(of.line, &of.place));
         Self {
             smallest_error_um: all.map(|(low, _)| low),
@@ -527,6 +571,7 @@ impl Path {
 /// The numbers of a program that is read.
 pub(crate) fn outcome(
     program: &Program,
+    drawing: &[StockRow],
     turned: Option<&Turned>,
     yielded: Option<&Yielded>,
     corrected: Option<&Corrected>,
@@ -545,6 +590,7 @@ pub(crate) fn outcome(
         cycles: program.cycles.clone(),
         moves,
         surface: turned.map(LeftSurface::of),
+        drawing: turned.and_then(|turned| ProgramError::of(turned, drawing)),
         yielding: yielded.map(|yielded| YieldedWork::of(yielded, &finishing)),
         compensation: corrected.map(CompensatedProgram::of),
     }

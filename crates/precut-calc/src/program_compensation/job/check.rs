@@ -15,6 +15,9 @@ pub(crate) const CODES: &[&str] = &[
     "tip_not_outside",
     "force_without_stock",
     "compensation_without_force",
+    "keep_out_without_length",
+    "keep_out_without_stock",
+    "drawing_without_stock",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -28,6 +31,19 @@ impl Check for Job {
     fn check(&self, violations: &mut Violations) {
         self.check_tools(violations);
         self.check_holding(violations);
+        for (i, keep_out) in self.keep_out.iter().enumerate() {
+            violations.require(keep_out.z_start_mm < keep_out.z_end_mm, || {
+                Finding::new("keep_out_without_length", format!("/keep_out/{i}/z_end_mm"))
+                    .measured(keep_out.z_end_mm, keep_out.z_start_mm, "mm")
+                    .with("above", keep_out.z_start_mm)
+            });
+        }
+        violations.require(self.drawing.is_empty() || self.stock.is_some(), || {
+            Finding::new("drawing_without_stock", "/stock")
+        });
+        violations.require(self.keep_out.is_empty() || self.stock.is_some(), || {
+            Finding::new("keep_out_without_stock", "/stock")
+        });
         let Some(stock) = &self.stock else { return };
         violations
             .require(self.program_zero_z_mm.is_some(), || Finding::new("program_zero_missing", "/program_zero_z_mm"));
@@ -35,6 +51,13 @@ impl Check for Job {
         for (i, pair) in stock.profile.windows(2).enumerate() {
             violations.require(pair[0].z_mm <= pair[1].z_mm, || {
                 Finding::new("profile_falls_back", format!("/stock/profile/{}/z_mm", i + 1))
+                    .measured(pair[1].z_mm, pair[0].z_mm, "mm")
+                    .with("minimum", pair[0].z_mm)
+            });
+        }
+        for (i, pair) in self.drawing.windows(2).enumerate() {
+            violations.require(pair[0].z_mm <= pair[1].z_mm, || {
+                Finding::new("profile_falls_back", format!("/drawing/{}/z_mm", i + 1))
                     .measured(pair[1].z_mm, pair[0].z_mm, "mm")
                     .with("minimum", pair[0].z_mm)
             });

@@ -33,6 +33,11 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("workpiece"))))]
     pub stock: Option<ProgramStock>,
+    /// The part of the drawing from the headstock end; a place twice is a step. With it the answer says how far the program is off it on
+    /// work and machine that do not yield; it is never corrected to it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 1000, extensions(("x-group" = json!("workpiece")), ("x-advanced" = json!(true))))]
+    pub drawing: Vec<StockRow>,
     /// The tools that cut. Needed with `stock`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 100, extensions(("x-group" = json!("cut"))))]
@@ -50,6 +55,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 32, extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
     pub support_lines: Vec<SupportLines>,
+    /// Where no tool may come: jaws, rests, a centre. A program that does so is told, and not corrected.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 16, extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub keep_out: Vec<KeepOut>,
     /// Compliance of carriage and tool.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("machine"))))]
@@ -142,6 +151,21 @@ pub struct SupportLines {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1, maximum = 200_000, example = 40, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N_2"))))]
     pub to_line: Option<u32>,
+}
+
+/// A cylinder about the axis in which no tool may come.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KeepOut {
+    /// Where it begins, from the headstock end.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 0.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("x_1"))))]
+    pub z_start_mm: f64,
+    /// Where it ends.
+    #[schema(minimum = -100_000.0, maximum = 100_000.0, example = 15.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("x_2"))))]
+    pub z_end_mm: f64,
+    /// Diameter.
+    #[schema(minimum = 0.01, maximum = 10_000.0, example = 120.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D"))))]
+    pub diameter_mm: f64,
 }
 
 /// The blank.
@@ -366,6 +390,22 @@ pub struct Mode {
     #[serde(default = "tenth")]
     #[schema(minimum = 0.01, maximum = 10.0, default = 0.1, example = 0.1, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l_b")), ("x-advanced" = json!(true))))]
     pub min_block_length_mm: f64,
+    /// Least time of a block at its feed, for the control to come after.
+    #[serde(default = "eight")]
+    #[schema(minimum = 0.0, maximum = 1000.0, default = 8.0, example = 8.0, extensions(("x-unit" = json!("ms")), ("x-symbol" = json!("t_b")), ("x-advanced" = json!(true))))]
+    pub min_block_time_ms: f64,
+    /// Cuts on a smaller diameter stay as they are.
+    #[serde(default = "three")]
+    #[schema(minimum = 2.0, maximum = 10_000.0, default = 3.0, example = 3.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d_min")), ("x-advanced" = json!(true))))]
+    pub minimum_diameter_mm: f64,
+}
+
+fn eight() -> f64 {
+    8.0
+}
+
+fn three() -> f64 {
+    3.0
 }
 
 fn half() -> f64 {

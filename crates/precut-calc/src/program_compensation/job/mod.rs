@@ -6,6 +6,6 @@ mod input;
 pub use crate::calculator::Dialect;
 pub(super) use check::CODES;
 pub use input::{
-    DecimalPoint, Job, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
+    DecimalPoint, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
     ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
 };

@@ -6,12 +6,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::super::super::job::Mode;
-use super::super::reader::{Kind, Program, ProgramMove, WordsOfLine};
+use super::super::reader::{Feed, Kind, Program, ProgramMove, WordsOfLine};
 use super::super::stock::{Stroke, Way};
-use super::super::yielding::{AXIS_MM, PlaceOfMove, Yielded};
+use super::super::yielding::{AXIS_MM, Instead, Pace, PlaceOfMove, Yielded};
+use super::calls::Calls;
 use super::chords::{Knot, Limits, Wanted, between, chords};
 
 const MM_PER_UM: f64 = 1e-3;
+const MIN_PER_MS: f64 = 1.0 / 60_000.0;
 /// A straight move along the axis by no more makes a face, which keeps its place, mm.
 const FACE_MM: f64 = 1e-9;
 /// Lengths that are no different, mm.
@@ -31,15 +33,15 @@ const OF_TOLERANCE: f64 = 0.8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WhyLeftAlone {
-    /// It belongs to a cycle or is run more than once.
+    /// It belongs to a cycle that cannot be written out as its moves, or is run more than once.
     Cycle,
     /// It makes a face, which keeps its place.
     Face,
-    /// It is an arc that a centre tells, or one of nearly half a turn.
+    /// It is an arc of nearly half a turn.
     Arc,
-    /// Its block has words that act at its end, or the next one cannot be made to begin elsewhere.
+    /// The next block cannot be made to begin elsewhere.
     Block,
-    /// It comes nearer to the axis than forces are known.
+    /// It comes nearer to the axis than `minimum_diameter_mm`.
     NearAxis,
     /// The work would come out too thin beside a jump of its shift.
     NotSupportedByModel,
@@ -65,6 +67,33 @@ pub(crate) struct Shifts {
     pub(crate) jumps: Vec<Jump>,
 }
 
+impl Shifts {
+    /// The largest one, mm.
+    pub(crate) fn largest_mm(&self) -> f64 {
+        self.knots.values().flatten().map(|knot| knot[1].abs()).fold(0.0, f64::max)
+    }
+
+    /// The largest share by which one changes how the work bends: four times its share of the radius.
+    pub(crate) fn largest_share(&self, ways: &BTreeMap<usize, Stroke<'_>>) -> f64 {
+        let share = |(index, knots): (&usize, &Vec<Knot>)| {
+            let [from, to] = ways.get(index).map(|stroke| stroke.way.ends())?;
+            let largest = knots.iter().map(|knot| knot[1].abs()).fold(0.0, f64::max);
+            Some(4.0 * largest / from[1].min(to[1]).max(AXIS_MM))
+        };
+        self.knots.iter().filter_map(share).fold(0.0, f64::max)
+    }
+
+    /// The ways that moves take with their shifts.
+    pub(crate) fn ways(&self, ways: &BTreeMap<usize, Stroke<'_>>) -> Instead {
+        let pieces = |(index, knots): (&usize, &Vec<Knot>)| {
+            let stroke = ways.get(index)?;
+            let lifted = |pair: &[Knot]| stroke.way.lifted([pair[0][0], pair[1][0]], [pair[0][1], pair[1][1]]);
+            Some((*index, knots.windows(2).map(|pair| (stroke.shape, lifted(pair))).collect()))
+        };
+        self.knots.iter().filter_map(pieces).collect()
+    }
+}
+
 /// A stretch over which the work may stay thick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jump {
@@ -82,7 +111,8 @@ fn words<'p>(program: &'p Program, one: &ProgramMove, index: usize) -> Option<&'
 pub(crate) fn eligible(
     program: &Program,
     ways: &BTreeMap<usize, Stroke<'_>>,
-    finishing: &[usize],
+    calls: &Calls<'_>,
+    (finishing, mode): (&[usize], &Mode),
     before: &Yielded,
 ) -> (BTreeSet<usize>, Vec<LeftAlone>) {
     let cut: BTreeSet<usize> = before.places.iter().map(|of| of.mv).collect();
@@ -92,7 +122,7 @@ pub(crate) fn eligible(
         if finishing.binary_search(&one.line).is_err() || !cut.contains(&index) {
             continue;
         }
-        match why_not(program, stroke) {
+        match why_not(program, calls, stroke, mode) {
             None => {
                 eligible.insert(index);
             }
@@ -108,45 +138,49 @@ fn is_face(stroke: &Stroke<'_>) -> bool {
     matches!(stroke.way, Way::Line(..)) && (from[0] - to[0]).abs() <= FACE_MM
 }
 
-fn why_not(program: &Program, stroke: &Stroke<'_>) -> Option<WhyLeftAlone> {
+fn why_not(program: &Program, calls: &Calls<'_>, stroke: &Stroke<'_>, mode: &Mode) -> Option<WhyLeftAlone> {
     let (one, index) = (stroke.one, stroke.index);
-    let Some(of_line) = words(program, one, index) else { return Some(WhyLeftAlone::Cycle) };
+    let of_line = words(program, one, index);
+    if of_line.is_none() && calls.of_move(index).is_none() {
+        return Some(WhyLeftAlone::Cycle);
+    }
     let [from, to] = stroke.way.ends();
     if let Way::Arc { turn, .. } = stroke.way {
-        let is_told = !of_line.has_centre && of_line.radius.is_some();
-        if !is_told || turn.abs() > WIDEST_RAD {
+        if turn.abs() > WIDEST_RAD {
             return Some(WhyLeftAlone::Arc);
         }
     } else if is_face(stroke) {
         return Some(WhyLeftAlone::Face);
     }
-    if from[1].min(to[1]) < AXIS_MM {
+    if from[1].min(to[1]) < AXIS_MM.max(0.5 * mode.minimum_diameter_mm) {
         return Some(WhyLeftAlone::NearAxis);
     }
-    // What follows has to be able to end where it did.
+    // What follows has to be able to end where it did; a cycle comes back to where it began.
     let next = program.moves.get(index + 1);
     let goes_on = next.is_none_or(|next| next.kind == Kind::Home || words(program, next, index + 1).is_some());
-    (of_line.ends_something || !goes_on).then_some(WhyLeftAlone::Block)
+    (of_line.is_some() && !goes_on).then_some(WhyLeftAlone::Block)
 }
 
 /// Lines that were planned and came out as they were.
 pub(crate) fn below_resolution(
     program: &Program,
     eligible: &BTreeSet<usize>,
-    changed: &[super::rewrite::ChangedLine],
+    changed: &BTreeSet<usize>,
 ) -> Vec<LeftAlone> {
-    let lines = eligible.iter().map(|&index| program.moves[index].line);
-    let stays = |line: &usize| changed.binary_search_by_key(line, |one| one.line).is_err();
-    lines.filter(stays).map(|line| LeftAlone { line, why: WhyLeftAlone::BelowResolution }).collect()
+    let stays = eligible.difference(changed).map(|&index| program.moves[index].line);
+    stays.map(|line| LeftAlone { line, why: WhyLeftAlone::BelowResolution }).collect()
 }
 
 /// What is wanted along all moves that cut.
 pub(crate) struct Plan<'a> {
     program: &'a Program,
     ways: &'a BTreeMap<usize, Stroke<'a>>,
+    calls: &'a Calls<'a>,
     curves: BTreeMap<usize, Curve>,
     eligible: &'a BTreeSet<usize>,
     limits: Limits,
+    /// Least time of a block, min.
+    min_block_min: f64,
     /// So near to a corner what is wanted counts for it, mm.
     near_mm: f64,
 }
@@ -155,7 +189,7 @@ impl<'a> Plan<'a> {
     /// Of a program whose moves were driven as they should come out.
     pub(crate) fn of(
         program: &'a Program,
-        ways: &'a BTreeMap<usize, Stroke<'a>>,
+        (ways, calls): (&'a BTreeMap<usize, Stroke<'a>>, &'a Calls<'a>),
         planned: &Yielded,
         eligible: &'a BTreeSet<usize>,
         mode: &Mode,
@@ -171,7 +205,16 @@ impl<'a> Plan<'a> {
                 curves.insert(index, Curve::of(stroke, places));
             }
         }
-        Self { program, ways, curves, eligible, limits, near_mm: mode.min_block_length_mm }
+        Self {
+            program,
+            ways,
+            calls,
+            curves,
+            eligible,
+            limits,
+            near_mm: mode.min_block_length_mm,
+            min_block_min: mode.min_block_time_ms * MIN_PER_MS,
+        }
     }
 
     /// Lays jumps of the shift over a longer stretch.
@@ -190,12 +233,26 @@ impl<'a> Plan<'a> {
             if let Some(before) = before.filter(|before| !self.eligible.contains(before) && start.abs() > 0.0) {
                 shifts.ends.insert(before, start);
             }
-            let knots = chords(&curve.points, start, end, self.limits);
+            let knots = chords(&curve.points, start, end, self.limits_of(stroke));
             shifts.jumps.extend(curve.jumps(&knots, self.limits.tolerance, stroke));
             let shares = knots.into_iter().map(|[at, shift]| [at / curve.length_mm, shift]);
             shifts.knots.insert(*index, shares.collect());
         }
         shifts
+    }
+
+    /// The limits with the length that the least time of a block makes at the feed of a move.
+    fn limits_of(&self, stroke: &Stroke<'_>) -> Limits {
+        let pace = Pace { feed: stroke.one.feed, speed: stroke.one.speed };
+        // Where a constant surface speed turns it fastest.
+        let [from, to] = stroke.way.ends();
+        let per_min = match pace.feed {
+            Some(Feed::PerRev(feed)) => pace.rpm(from[1].min(to[1])).map(|rpm| feed * rpm),
+            Some(Feed::PerMinute(feed)) => Some(feed),
+            None => None,
+        };
+        let of_time = per_min.map_or(0.0, |feed| feed * self.min_block_min);
+        Limits { shortest: self.limits.shortest.max(of_time), ..self.limits }
     }
 
     /// Whether the next move of the program begins where this one ends, with the same tool.
@@ -206,7 +263,8 @@ impl<'a> Plan<'a> {
 
     /// Whether where a move ends can be written.
     fn can_end(&self, index: usize) -> bool {
-        self.program.moves.get(index).is_some_and(|one| words(self.program, one, index).is_some())
+        let has_words = self.program.moves.get(index).is_some_and(|one| words(self.program, one, index).is_some());
+        has_words || self.calls.of_move(index).is_some()
     }
 
     /// Whether a move that is not shifted makes a part of the contour along the work: then it ends where it did.

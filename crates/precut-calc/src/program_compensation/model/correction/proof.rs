@@ -6,7 +6,7 @@ use crate::calculator::{Failure, Finding, Monitor};
 use crate::deflection_compensation::Holding;
 
 use super::super::super::job::{Job, ProgramStock};
-use super::super::reader::{self, Program, ProgramMove};
+use super::super::reader::{self, Feed, Program, ProgramMove, Speed};
 use super::super::stock::{Part, Turned, lines_that_finish, turned};
 use super::super::yielding::{ContourError, Driven, Yielded, contour, yielding};
 use super::compare::{Off, differences};
@@ -18,6 +18,8 @@ pub(crate) const FAILURE_CODES: &[&str] = &["proof_failed"];
 
 /// Places that should be one differ by less, mm.
 const SAME_MM: f64 = 1e-6;
+/// Feeds and speeds differ by a smaller share.
+const SAME_SHARE: f64 = 1e-9;
 /// A rapid move is deeper in the stock than before by more, mm.
 const DEEPER_MM: f64 = 1e-3;
 /// Rapid moves keep so far off the work, or as far as they did, mm.
@@ -129,9 +131,14 @@ pub(crate) fn proved(
             return Err(Failed::Part { part: "rapid", line, off_um: UM_PER_MM * (one.depth_mm - old) });
         }
     }
+    // A program that comes there as it is was not corrected.
+    if let Some(hit) = driven_rigid.hits.first() {
+        let line = written.given_line(hit.line);
+        return Err(Failed::Part { part: "keep_out", line, off_um: UM_PER_MM * hit.depth_mm });
+    }
     let finishing = lines_that_finish(&driven_rigid);
     let of = written.moves();
-    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), given: Some((program, &of)) };
+    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
     let mut after = yielding(&read, &again, holding, blank, driven, monitor)?;
     // What was meant is what the given program means.
     after.nominal.clone_from(&task.before.nominal);
@@ -140,8 +147,10 @@ pub(crate) fn proved(
     let Compared { residual_um, residual_at_mm, transitions } =
         outlines(&task.planned.real, &after.real, jumps, residual_mm)?;
     let errors = contour(&after);
+    // Transitions follow each other along the work.
     let is_counted = |error: &&ContourError| {
-        !transitions.iter().any(|one| (one.from_mm - SAME_MM..=one.to_mm + SAME_MM).contains(&error.z_mm))
+        let next = transitions.partition_point(|one| one.to_mm + SAME_MM < error.z_mm);
+        !transitions.get(next).is_some_and(|one| one.from_mm - SAME_MM <= error.z_mm)
     };
     let ends = |errors: &[ContourError]| {
         let counted = errors.iter().filter(is_counted).map(|error| error.error_um);
@@ -223,14 +232,13 @@ fn compare(old: &Program, new: &Program, written: &Written) -> Result<usize, Fai
     let mut found = new.moves.iter();
     let mut compared = 0;
     let failed = |line: usize| Failed::Part { part: "read_again", line, off_um: 0.0 };
-    for (one, &pieces) in old.moves.iter().zip(&written.pieces) {
+    for (index, (one, &pieces)) in old.moves.iter().zip(&written.pieces).enumerate() {
         let own: Vec<&ProgramMove> = found.by_ref().take(pieces).collect();
         let is_same = own.len() == pieces
             && own.iter().all(|piece| {
-                (piece.kind, piece.feed, piece.speed, piece.tool, piece.nose)
-                    == (one.kind, one.feed, one.speed, one.tool, one.nose)
+                (piece.kind, piece.tool, piece.nose) == (one.kind, one.tool, one.nose) && is_as_fast(piece, one)
             })
-            && own.last().is_some_and(|last| ends_where(one, last, written));
+            && own.last().is_some_and(|last| ends_where(one, last, written.shift_mm[index]));
         if !is_same {
             return Err(failed(one.line));
         }
@@ -242,14 +250,28 @@ fn compare(old: &Program, new: &Program, written: &Written) -> Result<usize, Fai
     }
 }
 
+/// Whether feed and speed are the same, however they are written.
+fn is_as_fast(a: &ProgramMove, b: &ProgramMove) -> bool {
+    let same = |a: f64, b: f64| (a - b).abs() <= SAME_SHARE * a.abs();
+    let same_feed = match (a.feed, b.feed) {
+        (Some(Feed::PerRev(a)), Some(Feed::PerRev(b))) | (Some(Feed::PerMinute(a)), Some(Feed::PerMinute(b))) => {
+            same(a, b)
+        }
+        (a, b) => a == b,
+    };
+    let same_speed = match (a.speed, b.speed) {
+        (Some(Speed::Spindle(a)), Some(Speed::Spindle(b))) => same(a, b),
+        (Some(Speed::Surface(a, limit)), Some(Speed::Surface(b, other))) => same(a, b) && limit == other,
+        (a, b) => a == b,
+    };
+    same_feed && same_speed
+}
+
 /// Whether a move ends where it did, or, where it was corrected, at the same place along the axis.
-fn ends_where(old: &ProgramMove, new: &ProgramMove, written: &Written) -> bool {
+fn ends_where(old: &ProgramMove, new: &ProgramMove, shift_mm: f64) -> bool {
     let same = |a: Option<f64>, b: Option<f64>, within: f64| match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() <= within,
         (a, b) => a == b,
     };
-    let shift_mm = written
-        .change(old.line)
-        .map_or(0.0, |changed| changed.smallest_shift_um.abs().max(changed.largest_shift_um.abs()) / UM_PER_MM);
     same(old.end.z, new.end.z, SAME_MM) && same(old.end.x, new.end.x, shift_mm + SAME_MM)
 }

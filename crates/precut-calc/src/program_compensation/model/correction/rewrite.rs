@@ -1,10 +1,12 @@
 //! Shifts written into a program: numbers of X, and lines for further pieces. Nothing else changes (`program/6`).
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::ops::Range;
 
 use super::super::super::job::{Dialect, Mode};
-use super::super::reader::{Kind, NumberInText, Program, ProgramMove, WordsOfLine, lines_of_text};
+use super::super::reader::{Kind, NumberInText, Program, ProgramMove, WordsOfLine, centre_of_short_arc, lines_of_text};
+use super::calls::Calls;
 use super::plan::Shifts;
 
 /// Lengths that are no different, mm.
@@ -31,8 +33,11 @@ pub(crate) struct ChangedLine {
 pub(crate) struct Written {
     pub(crate) text: String,
     pub(crate) changed: Vec<ChangedLine>,
-    /// How many moves stand for each of the program's.
+    /// How many moves stand for each of the program's, and how far off it may end, on the diameter, mm.
     pub(crate) pieces: Vec<usize>,
+    pub(crate) shift_mm: Vec<f64>,
+    /// The moves whose text became another.
+    pub(crate) moved: BTreeSet<usize>,
 }
 
 impl Written {
@@ -48,11 +53,6 @@ impl Written {
         line - added
     }
 
-    /// What became of a line of the given program.
-    pub(crate) fn change(&self, line: usize) -> Option<&ChangedLine> {
-        self.changed.binary_search_by_key(&line, |changed| changed.line).ok().map(|at| &self.changed[at])
-    }
-
     /// Of which move of the given program every move of the new one is a piece.
     pub(crate) fn moves(&self) -> Vec<usize> {
         self.pieces.iter().enumerate().flat_map(|(mv, &pieces)| std::iter::repeat_n(mv, pieces)).collect()
@@ -66,33 +66,49 @@ impl Written {
 }
 
 /// Where the tool is after a move: diameter and z, mm.
-type Point = [f64; 2];
+pub(super) type Point = [f64; 2];
 
 /// Writes the shifts into the text.
-pub(crate) fn rewritten(text: &str, dialect: Dialect, program: &Program, shifts: &Shifts, mode: &Mode) -> Written {
+pub(crate) fn rewritten(
+    text: &str,
+    dialect: Dialect,
+    (program, calls): (&Program, &Calls<'_>),
+    shifts: &Shifts,
+    mode: &Mode,
+) -> Written {
     let lines = lines_of_text(text);
-    let mut written = Written { text: String::new(), changed: Vec::new(), pieces: vec![1; program.moves.len()] };
+    let count = program.moves.len();
+    let mut written = Written {
+        text: String::new(),
+        changed: Vec::new(),
+        pieces: vec![1; count],
+        shift_mm: vec![0.0; count],
+        moved: BTreeSet::new(),
+    };
     // Where the tool really is, and where the program means it to be.
     let (mut real, mut meant): (Option<Point>, Option<Point>) = (None, None);
-    for (index, one) in program.moves.iter().enumerate() {
+    let mut index = 0;
+    while let Some(one) = program.moves.get(index) {
+        if let Some(call) = calls.of_move(index).filter(|call| call.moves.start == index)
+            && let Some(line) = lines.get(call.line - 1)
+            && written.write_out(text, line.clone(), dialect, (program, call), meant, shifts, mode)
+        {
+            index = call.moves.end;
+            meant = program.moves[index - 1].end.known();
+            real = meant;
+            continue;
+        }
         let end = one.end.known();
         let words = program.words_of_lines.get(&one.line).and_then(Option::as_ref).filter(|words| words.mv == index);
         let mut arrived = end;
         if let (Some(words), Some(end), Some(range)) = (words, end, lines.get(one.line - 1)) {
-            let line = Line { text, range: range.clone(), words, dialect, one, step: step(words, mode) };
+            let line = Line { text, range: range.clone(), words, dialect, one, step: step(words.unit_z_mm, mode) };
             let pieces = line.pieces(shifts, index, meant, end);
             // A place that nobody knows is not shifted.
             let from = real.or(meant);
             if let Some((new, last)) = line.rewritten(&pieces, from, meant) {
-                written.pieces[index] = pieces.len();
-                let shift = |piece: &Piece| 2.0 * piece.shift_mm / MM_PER_UM;
-                written.changed.push(ChangedLine {
-                    line: one.line,
-                    old: text[range.clone()].to_owned(),
-                    new,
-                    smallest_shift_um: pieces.iter().map(shift).fold(f64::INFINITY, f64::min),
-                    largest_shift_um: pieces.iter().map(shift).fold(f64::NEG_INFINITY, f64::max),
-                });
+                written.keep(index, &pieces);
+                written.changed.push(changed_line(one.line, &text[range.clone()], new, &pieces));
                 arrived = Some(last);
             } else if let (Some(from), Some(meant), None) = (from, meant, &words.x) {
                 // Without a word of X the tool stays where it is.
@@ -100,10 +116,32 @@ pub(crate) fn rewritten(text: &str, dialect: Dialect, program: &Program, shifts:
             }
         }
         (real, meant) = (arrived, end);
+        index += 1;
     }
     written.changed.sort_by_key(|one| one.line);
     written.text = applied(text, &lines, &written.changed);
     written
+}
+
+/// A line that became others, with the shifts of all that stands in it.
+pub(super) fn changed_line(line: usize, old: &str, new: Vec<String>, pieces: &[Piece]) -> ChangedLine {
+    let shift = |piece: &Piece| 2.0 * piece.shift_mm / MM_PER_UM;
+    ChangedLine {
+        line,
+        old: old.to_owned(),
+        new,
+        smallest_shift_um: pieces.iter().map(shift).fold(f64::INFINITY, f64::min),
+        largest_shift_um: pieces.iter().map(shift).fold(f64::NEG_INFINITY, f64::max),
+    }
+}
+
+impl Written {
+    /// Keeps that a move became these pieces.
+    pub(super) fn keep(&mut self, index: usize, pieces: &[Piece]) {
+        self.pieces[index] = pieces.len();
+        self.shift_mm[index] = pieces.iter().map(|piece| 2.0 * piece.shift_mm.abs()).fold(0.0, f64::max);
+        self.moved.insert(index);
+    }
 }
 
 /// The text with lines replaced, each with its own line end.
@@ -124,26 +162,26 @@ fn applied(text: &str, lines: &[Range<usize>], changed: &[ChangedLine]) -> Strin
 }
 
 /// The least step of X as it is written, in its unit.
-fn step(words: &WordsOfLine, mode: &Mode) -> f64 {
-    if words.unit_z_mm > 1.0 { INCH_STEP } else { mode.increment_um * MM_PER_UM }
+pub(super) fn step(unit_mm: f64, mode: &Mode) -> f64 {
+    if unit_mm > 1.0 { INCH_STEP } else { mode.increment_um * MM_PER_UM }
 }
 
 /// A piece of a move: its end and the shift of the radius there.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
-    end: Point,
+pub(super) struct Piece {
+    pub(super) end: Point,
     share: f64,
-    shift_mm: f64,
+    pub(super) shift_mm: f64,
 }
 
 /// A line that makes one move.
-struct Line<'a> {
-    text: &'a str,
-    range: Range<usize>,
-    words: &'a WordsOfLine,
-    dialect: Dialect,
-    one: &'a ProgramMove,
-    step: f64,
+pub(super) struct Line<'a> {
+    pub(super) text: &'a str,
+    pub(super) range: Range<usize>,
+    pub(super) words: &'a WordsOfLine,
+    pub(super) dialect: Dialect,
+    pub(super) one: &'a ProgramMove,
+    pub(super) step: f64,
 }
 
 /// Pieces without those that go on as straight as the ones before them.
@@ -169,7 +207,7 @@ fn rounded(value: f64, grid: f64) -> f64 {
 
 impl Line<'_> {
     /// Where the pieces of the move end, rounded as they can be written.
-    fn pieces(&self, shifts: &Shifts, index: usize, from: Option<Point>, end: Point) -> Vec<Piece> {
+    pub(super) fn pieces(&self, shifts: &Shifts, index: usize, from: Option<Point>, end: Point) -> Vec<Piece> {
         let unit = self.words.x.as_ref().map_or(self.words.unit_x_mm, |x| x.unit_mm.max(self.words.unit_x_mm));
         let grid = [unit * self.step, self.words.unit_z_mm * self.step];
         let at = |share: f64, shift_mm: f64| {
@@ -250,6 +288,10 @@ impl Line<'_> {
             let length = first.end[1] - if z.is_relative { from?[1] } else { 0.0 };
             edits.push((z.range.clone(), self.number(length, z)));
         }
+        self.edit_centre(from.or(meant).map(|from| (from, first.end)), &mut edits);
+        // What acts at the end of the block goes to the last one.
+        let at_end: &[Range<usize>] = if rest.is_empty() { &[] } else { &self.words.at_end };
+        edits.extend(at_end.iter().map(|range| (self.with_blank(range), String::new())));
         edits.sort_by_key(|(range, _)| range.start);
         let (mut line, mut at) = (String::new(), self.range.start);
         for (range, new) in edits {
@@ -266,17 +308,85 @@ impl Line<'_> {
             lines.push(self.further(last, piece.end));
             last = piece.end;
         }
+        if let Some(line) = lines.last_mut() {
+            let blank = if self.has_blanks() { " " } else { "" };
+            for range in at_end {
+                let _ = write!(line, "{blank}{}", &self.text[range.clone()]);
+            }
+        }
         (!(is_same && rest.is_empty())).then_some((lines, last))
     }
 
+    /// A word with the blanks before it.
+    fn with_blank(&self, range: &Range<usize>) -> Range<usize> {
+        let before = &self.text[self.range.start..range.start];
+        self.range.start + before.trim_end_matches([' ', '\t']).len()..range.end
+    }
+
+    /// Centre of a piece of an arc that is told by a centre, in numbers that can be written: as near as may be to where it is as far
+    /// from both ends as before.
+    fn centre(&self, from: Point, to: Point) -> Option<Point> {
+        let [cx, cz] = self.one.centre.filter(|_| self.words.centre.iter().any(Option::is_some))?;
+        let end = self.one.end.known()?;
+        let radius = (0.5 * (end[0] - cx)).hypot(end[1] - cz);
+        let point = |[x, z]: Point| [0.5 * x, z];
+        let exact = centre_of_short_arc(point(from), point(to), radius, self.one.kind == Kind::ArcCw)?;
+        let grid = self.words.unit_z_mm * self.step;
+        let base = self.centre_base(from);
+        let near = [-1.0, 0.0, 1.0].map(|by| by * grid);
+        let told = [0, 1].map(|axis| rounded(exact[axis] - base[axis], grid));
+        let off = |centre: &Point| {
+            let of = |[r, z]: Point| ((r - centre[0]).hypot(z - centre[1]) - radius).abs();
+            of(point(from)).max(of(point(to)))
+        };
+        let all = near.iter().flat_map(|i| near.iter().map(move |k| [base[0] + told[0] + i, base[1] + told[1] + k]));
+        all.min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
+
+    /// Where its words count a centre from: radius and z.
+    fn centre_base(&self, from: Point) -> Point {
+        let is_relative =
+            self.words.centre.iter().flatten().next().map_or(!self.words.is_centre_absolute, |word| word.is_relative);
+        if is_relative { [0.5 * from[0], from[1]] } else { [0.0; 2] }
+    }
+
+    /// Words of the centre for the first piece.
+    fn edit_centre(&self, piece: Option<(Point, Point)>, edits: &mut Vec<(Range<usize>, String)>) {
+        let Some((from, centre)) = piece.and_then(|(from, to)| self.centre(from, to).map(|centre| (from, centre)))
+        else {
+            return;
+        };
+        let base = self.centre_base(from);
+        for (axis, letter) in ['I', 'K'].into_iter().enumerate() {
+            let length = centre[axis] - base[axis];
+            match &self.words.centre[axis] {
+                Some(old) => {
+                    let number = self.number(length, old);
+                    let is_same = self.text[old.range.clone()].parse::<f64>().ok() == number.parse::<f64>().ok();
+                    if !is_same {
+                        edits.push((old.range.clone(), number));
+                    }
+                }
+                None if length.abs() < 0.5 * self.words.unit_z_mm * self.step => {}
+                None => {
+                    let at = self.words.centre.iter().flatten().map(|word| word.range.end).max();
+                    let blank = if self.has_blanks() { " " } else { "" };
+                    edits.extend(
+                        at.map(|at| (at..at, blank.to_owned() + &self.word(letter, length, self.words.unit_z_mm))),
+                    );
+                }
+            }
+        }
+    }
+
     /// Whether its words have small letters; comments say nothing of that.
-    fn is_small(&self) -> bool {
+    pub(super) fn is_small(&self) -> bool {
         let number = self.words.z.as_ref().or(self.words.x.as_ref());
         let before = number.map_or("", |number| &self.text[self.range.start..number.range.start]);
         before.bytes().rev().find(u8::is_ascii_alphabetic).is_some_and(|letter| letter.is_ascii_lowercase())
     }
 
-    fn has_blanks(&self) -> bool {
+    pub(super) fn has_blanks(&self) -> bool {
         self.text[self.range.clone()].trim().contains(' ')
     }
 
@@ -291,9 +401,21 @@ impl Line<'_> {
         }
     }
 
-    fn word(&self, letter: char, length_mm: f64, unit_mm: f64) -> String {
+    pub(super) fn word(&self, letter: char, length_mm: f64, unit_mm: f64) -> String {
         let letter = if self.is_small() { letter.to_ascii_lowercase() } else { letter };
         format!("{letter}{}", decimal(length_mm / unit_mm, self.step))
+    }
+
+    /// A word of the centre of a further piece; where Siemens says a place by `AC`, so does it.
+    fn centre_word(&self, letter: char, axis: usize, length_mm: f64) -> String {
+        let is_said =
+            self.words.centre[axis].as_ref().is_some_and(|word| word.is_relative == self.words.is_centre_absolute);
+        let word = self.word(letter, length_mm, self.words.unit_z_mm);
+        if !is_said || self.dialect != Dialect::Siemens {
+            return word;
+        }
+        let way = if self.words.is_centre_absolute { "IC" } else { "AC" };
+        format!("{}={way}({})", &word[..1], &word[1..])
     }
 
     /// A line of its own for a further piece.
@@ -306,6 +428,13 @@ impl Line<'_> {
             let is_name = self.dialect == Dialect::Siemens;
             let parted = if is_name { " " } else { blank };
             let _ = write!(line, "{parted}{}", &self.text[radius.clone()]);
+        }
+        if let Some(centre) = self.centre(from, to) {
+            let base = self.centre_base(from);
+            for (axis, letter) in ['I', 'K'].into_iter().enumerate() {
+                let word = self.centre_word(letter, axis, centre[axis] - base[axis]);
+                let _ = write!(line, "{blank}{word}");
+            }
         }
         line
     }
@@ -339,7 +468,7 @@ impl Line<'_> {
 }
 
 /// A number with a decimal point and no more decimals than it needs.
-fn decimal(value: f64, step: f64) -> String {
+pub(super) fn decimal(value: f64, step: f64) -> String {
     // A step has six decimals at the most.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let decimals = (-step.log10() - 1e-9).ceil().clamp(1.0, 6.0) as usize;

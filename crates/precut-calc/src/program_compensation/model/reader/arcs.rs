@@ -42,6 +42,12 @@ pub(super) fn centre_of_radius(start: Point, end: Point, radius: f64, path: Path
     Some([middle[0] + side * along_z, middle[1] - side * along_r])
 }
 
+/// Centre of an arc of less than half a turn.
+pub(crate) fn centre_of_short_arc(start: [f64; 2], end: [f64; 2], radius: f64, is_clockwise: bool) -> Option<[f64; 2]> {
+    let path = if is_clockwise { Path::Clockwise } else { Path::CounterClockwise };
+    if are_apart(start, end) { centre_of_radius(start, end, radius.abs(), path) } else { None }
+}
+
 /// Whether an arc turns back on an axis between its ends: radius or z has an extreme there.
 pub(super) fn turns_back(start: Point, end: Point, centre: Point, path: Path) -> bool {
     let angle = |point: Point| (point[0] - centre[0]).atan2(point[1] - centre[1]);

@@ -13,7 +13,7 @@ use super::state::{INCH_MM, Motion, SingleWords, State, Width};
 use super::{Reader, whole};
 
 /// Feet in metres.
-const FOOT_M: f64 = 0.3048;
+pub(super) const FOOT_M: f64 = 0.3048;
 /// Increment of a feed per revolution, mm: F20 is 0.20 mm where X100 is 0.100 mm.
 const FEED_STEP_MM: f64 = 0.01;
 
@@ -606,7 +606,9 @@ impl<'a> Reader<'a> {
                 }
                 words.take_rest();
             }
-            Motion::Single { across, words: kept } => self.single(words, first, across, kept),
+            Motion::Single { across, words: kept } => {
+                self.single(words, first, (across, asked.motion.is_some()), kept);
+            }
         }
     }
 
@@ -679,7 +681,7 @@ impl<'a> Reader<'a> {
             }
         }
         if self.moves.len() > before {
-            self.keep_words(words);
+            self.keep_words(words, asked.motion.is_some());
         }
         if end.known().is_some() {
             // A later fault is one of its own.

@@ -8,6 +8,7 @@ use super::codes::Path;
 use super::faults::{Notes, Spot};
 use super::lexer;
 use super::moves::{ContourCycle, CycleKind, Kind, Move, Place};
+use super::words_of_line::says_way_alone;
 use super::{Reader, whole};
 
 /// Lengths that are no different, mm.
@@ -153,8 +154,14 @@ impl<'a> Reader<'a> {
             allowance_x_diameter_mm: 0.0,
             allowance_z_mm: 0.0,
         });
+        let made = (self.moves.len(), self.state.speed());
         self.run_contour(lines, Use::Finish)?;
         self.go(spot.line, Kind::Rapid, Place::at(x, z), None);
+        let is_plain = (lines.from..=lines.to)
+            .all(|at| says_way_alone(&lexer::block(self.line(at), at + 1, self.dialect, &mut Notes::default())));
+        if is_plain {
+            self.keep_call(words, made, true);
+        }
         Ok(None)
     }
 

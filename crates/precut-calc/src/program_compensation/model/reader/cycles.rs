@@ -8,7 +8,13 @@ use super::state::{Motion, SingleWords};
 
 impl<'a> Reader<'a> {
     /// A pass and its way back. What it is told holds for the next lines until another motion is named.
-    pub(super) fn single(&mut self, words: &mut Words<'_, 'a>, first: Spot<'a>, across: bool, mut kept: SingleWords) {
+    pub(super) fn single(
+        &mut self,
+        words: &mut Words<'_, 'a>,
+        first: Spot<'a>,
+        (across, names_motion): (bool, bool),
+        mut kept: SingleWords,
+    ) {
         let line = words.block.line;
         let from = self.state.place;
         let named = |letters: [u8; 2]| letters.iter().any(|&letter| words.look(letter).is_some());
@@ -31,6 +37,7 @@ impl<'a> Reader<'a> {
         let (true, Some([x0, z0]), Some([x, z])) = (self.may_cut(first, end), from.known(), end.known()) else {
             return;
         };
+        let made = (self.moves.len(), self.state.speed());
         if across {
             self.go(line, Kind::Rapid, Place::at(x0, z + kept.taper), None);
             self.go(line, Kind::Line, Place::at(x, z), None);
@@ -41,5 +48,6 @@ impl<'a> Reader<'a> {
             self.go(line, Kind::Line, Place::at(x0, z), None);
         }
         self.go(line, Kind::Rapid, Place::at(x0, z0), None);
+        self.keep_call(words, made, names_motion);
     }
 }

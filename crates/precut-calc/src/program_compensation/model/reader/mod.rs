@@ -29,10 +29,11 @@ use lines::Extent;
 use moves::{Move, Place};
 use state::State;
 
+pub(crate) use arcs::centre_of_short_arc;
 pub(crate) use lines::lines as lines_of_text;
 pub use moves::{ContourCycle, CycleKind, Kind, Nose};
 pub(crate) use moves::{Feed, Move as ProgramMove, Speed};
-pub(crate) use words_of_line::{NumberInText, WordsOfLine};
+pub(crate) use words_of_line::{Call, NumberInText, WordsOfLine};
 
 /// Most lines of a program.
 pub const MAX_LINES: usize = 200_000;
@@ -116,6 +117,8 @@ pub(crate) struct Program {
     pub(crate) cycles: Vec<ContourCycle>,
     /// The words of the lines that make one move along a path; none of a line that makes several.
     pub(crate) words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
+    /// The single cycles and finishing cycles, in the order of execution.
+    pub(crate) calls: Vec<Call>,
     /// What is to be said of it.
     pub(crate) warnings: Vec<Finding>,
 }
@@ -154,6 +157,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         tools: Vec::new(),
         cycles: Vec::new(),
         words_of_lines: BTreeMap::new(),
+        calls: Vec::new(),
         numbers: None,
         contour: None,
         contours: Vec::new(),
@@ -164,7 +168,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         unknown_functions: Vec::new(),
     };
     reader.run(monitor)?;
-    let Reader { mut notes, moves, tools, cycles, words_of_lines, .. } = reader;
+    let Reader { mut notes, moves, tools, cycles, words_of_lines, calls, .. } = reader;
     if notes.count() == 0 && moves.is_empty() {
         notes.fault(Spot { line: 1, column: 1, word: "" }, "nothing_in_program");
     }
@@ -172,7 +176,16 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         return Err(refused_with(notes, hints::other_dialect(text, &lines, dialect)));
     }
     let (_, _, warnings) = notes.into_parts();
-    Ok(Program { lines: lines.len(), moves, tools, cycles, words_of_lines, warnings })
+    Ok(Program { lines: lines.len(), moves, tools, cycles, words_of_lines, calls, warnings })
+}
+
+impl Program {
+    /// The line at which a move is executed: of the lines of a contour that of the cycle that runs them.
+    pub(crate) fn executed_at(&self, index: usize) -> usize {
+        let behind = self.calls.partition_point(|call| call.moves.start <= index);
+        let call = behind.checked_sub(1).and_then(|at| self.calls.get(at)).filter(|call| call.moves.contains(&index));
+        call.map_or_else(|| self.moves.get(index).map_or(0, |one| one.line), |call| call.line)
+    }
 }
 
 fn refused(notes: Notes) -> Failure {
@@ -199,6 +212,7 @@ struct Reader<'a> {
     tools: Vec<String>,
     cycles: Vec<ContourCycle>,
     words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
+    calls: Vec<Call>,
     /// Lines by the numbers of their blocks, once they are asked for.
     numbers: Option<Vec<(u64, usize)>>,
     /// What is done with the contour whose lines are run.

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::super::super::job::DecimalPoint;
 use super::Reader;
-use super::block::Words;
-use super::lexer::{Operand, Word};
+use super::block::{FOOT_M, Words};
+use super::lexer::{Block, Operand, Word};
+use super::moves::Speed;
 use super::state::INCH_MM;
 
 /// A number in the text.
@@ -30,8 +31,10 @@ pub(crate) struct WordsOfLine {
     pub(crate) z: Option<NumberInText>,
     /// The word of the radius of an arc.
     pub(crate) radius: Option<Range<usize>>,
-    /// Whether its arc is told by a centre.
-    pub(crate) has_centre: bool,
+    /// The words of the centre of an arc that is told by one: along the radius and along the axis.
+    pub(crate) centre: [Option<NumberInText>; 2],
+    /// Whether a centre counts from program zero unless its words say otherwise.
+    pub(crate) is_centre_absolute: bool,
     /// Where a word of X is put in, in bytes of the text.
     pub(crate) put_in_at: usize,
     /// Whether words count from where the tool is unless they say otherwise.
@@ -39,16 +42,52 @@ pub(crate) struct WordsOfLine {
     /// What one of an absolute word of X and of Z is, mm.
     pub(crate) unit_x_mm: f64,
     pub(crate) unit_z_mm: f64,
-    /// Whether it has words that act at the end of the block.
-    pub(crate) ends_something: bool,
+    /// Its words that act at the end of the block.
+    pub(crate) at_end: Vec<Range<usize>>,
+    /// Whether it names its motion, whatever the line before it did.
+    pub(crate) names_motion: bool,
+}
+
+/// A cycle that a line of its own calls, and that may be written out as its moves.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Call {
+    /// Line of the call, from 1.
+    pub(crate) line: usize,
+    /// Its moves.
+    pub(crate) moves: Range<usize>,
+    /// Speed that holds before it; none where its line says one.
+    pub(crate) speed_before: Option<Speed>,
+    /// What one of a word of X, of Z and of a feed is, and of a speed of the surface, mm and m/min.
+    pub(crate) unit_x_mm: f64,
+    pub(crate) unit_z_mm: f64,
+    pub(crate) unit_of_feed: f64,
+    pub(crate) unit_of_speed: f64,
+    /// Whether its line names the cycle, whatever the line before it did.
+    pub(crate) names_motion: bool,
+    /// Whether its line has nothing but the cycle in it.
+    pub(crate) is_plain: bool,
+}
+
+/// What a number is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    X,
+    Z,
+    /// Of a centre, on the radius or along the axis.
+    Centre,
 }
 
 /// Functions that act when the motion of their block is over.
 const AT_END: [f64; 6] = [0.0, 1.0, 2.0, 5.0, 9.0, 30.0];
 
+/// Whether a block says where the tool goes, how fast, and nothing else.
+pub(super) fn says_way_alone(block: &Block<'_>) -> bool {
+    block.words.iter().all(|word| b"GPQXZUWRIKFS".contains(&word.letter))
+}
+
 impl<'a> Reader<'a> {
     /// Keeps the words of a line that has just made a move. A line that makes one twice is kept as such.
-    pub(super) fn keep_words(&mut self, words: &Words<'_, 'a>) {
+    pub(super) fn keep_words(&mut self, words: &Words<'_, 'a>, names_motion: bool) {
         let line = words.block.line;
         let is_again = self.contour.is_some() || self.words_of_lines.contains_key(&line);
         let Some(mv) = self.moves.len().checked_sub(1).filter(|_| !is_again) else {
@@ -64,23 +103,50 @@ impl<'a> Reader<'a> {
         let last = words.block.words.iter().map(|word| self.range_of(*word).end).max();
         let put_in_at = z.map(|word| self.offset(word.spot.word)).or(last).unwrap_or(0);
         let unit = if self.state.inch { INCH_MM } else { 1.0 };
-        let ends_something =
-            words.block.words.iter().any(|word| {
-                word.letter == b'M' && AT_END.iter().any(|function| (word.number() - function).abs() < 1e-9)
-            });
+        let acts_at_end = |word: &&Word<'a>| {
+            word.letter == b'M' && AT_END.iter().any(|function| (word.number() - function).abs() < 1e-9)
+        };
+        let at_end = words.block.words.iter().filter(acts_at_end).map(|word| self.range_of(*word)).collect();
         let kept = WordsOfLine {
             mv,
-            x: x.and_then(|word| self.number_of(word, true)),
-            z: z.and_then(|word| self.number_of(word, false)),
+            x: x.and_then(|word| self.number_of(word, Axis::X)),
+            z: z.and_then(|word| self.number_of(word, Axis::Z)),
             radius: radius.map(in_text),
-            has_centre: by_letter(b'I').is_some() || by_letter(b'K').is_some(),
+            centre: [b'I', b'K'].map(|letter| by_letter(letter).and_then(|word| self.number_of(word, Axis::Centre))),
+            is_centre_absolute: self.state.centre_absolute,
             put_in_at,
             is_relative: self.state.is_relative && self.dialect != super::Dialect::FanucA,
             unit_x_mm: unit * self.state.to_diameter(false),
             unit_z_mm: unit,
-            ends_something,
+            at_end,
+            names_motion,
         };
         self.words_of_lines.insert(line, Some(kept));
+    }
+
+    /// Keeps a cycle whose moves have just been made, from the first one on.
+    pub(super) fn keep_call(
+        &mut self,
+        words: &Words<'_, 'a>,
+        (first, speed_before): (usize, Option<Speed>),
+        names_motion: bool,
+    ) {
+        let block = words.block;
+        let codes = block.words.iter().filter(|word| word.letter == b'G').count();
+        let is_absolute = !self.state.is_relative || self.dialect == super::Dialect::FanucA;
+        let is_plain = says_way_alone(block) && codes <= 1 && !block.has_stroke && is_absolute;
+        let unit = if self.state.inch { INCH_MM } else { 1.0 };
+        self.calls.push(Call {
+            line: block.line,
+            moves: first..self.moves.len(),
+            speed_before: speed_before.filter(|_| words.look(b'S').is_none()),
+            unit_x_mm: unit * self.state.to_diameter(false),
+            unit_z_mm: unit,
+            unit_of_feed: if self.state.feed_inch { INCH_MM } else { 1.0 },
+            unit_of_speed: if self.state.inch { FOOT_M } else { 1.0 },
+            names_motion,
+            is_plain: is_plain && self.contour.is_none(),
+        });
     }
 
     /// Where a piece of the text stands in it.
@@ -93,12 +159,12 @@ impl<'a> Reader<'a> {
         from..from + word.spot.word.len()
     }
 
-    fn number_of(&self, word: Word<'a>, is_x: bool) -> Option<NumberInText> {
+    fn number_of(&self, word: Word<'a>, axis: Axis) -> Option<NumberInText> {
         let (number, is_relative) = match word.operand {
             Operand::Number(number) => {
                 let by_letter = matches!(word.letter, b'U' | b'W');
                 let by_mode = self.state.is_relative && self.dialect != super::Dialect::FanucA;
-                (number, by_letter || by_mode)
+                (number, if axis == Axis::Centre { !self.state.centre_absolute } else { by_letter || by_mode })
             }
             Operand::Relative(number) => (number, true),
             Operand::Absolute(number) => (number, false),
@@ -112,7 +178,7 @@ impl<'a> Reader<'a> {
         let to = text.rfind(|c: char| c.is_ascii_digit() || c == '.')? + 1;
         let start = self.offset(text);
         let unit = if self.state.inch { INCH_MM } else { 1.0 };
-        let factor = if is_x { self.state.to_diameter(is_relative) } else { 1.0 };
+        let factor = if axis == Axis::X { self.state.to_diameter(is_relative) } else { 1.0 };
         let as_increments = self.is_fanuc() && self.reading.decimal_point == Some(DecimalPoint::AsIncrements);
         let step = if self.state.inch { 0.1 } else { 1.0 } * self.reading.increment_um * 1e-3;
         Some(NumberInText {

@@ -4,6 +4,8 @@
 //! held against that radius alone: the edge of a tool reaches over all that is turned already, and a program of ten thousand
 //! lines leaves as many parts.
 
+use std::sync::{Arc, OnceLock};
+
 use super::curve::{Curve, Piece, SAME_MM};
 
 /// Most parts of a run.
@@ -30,12 +32,17 @@ struct Run {
     parts: Vec<Part>,
     /// No radius in it is larger, mm.
     highest_mm: f64,
+    /// What was summed over it, once it was asked for.
+    sums: OnceLock<Sums>,
 }
+
+/// Sums over a stretch.
+pub(crate) type Sums = [f64; 3];
 
 impl Run {
     fn of(parts: Vec<Part>) -> Self {
         let highest_mm = parts.iter().map(|part| part.piece.highest()).fold(0.0, f64::max);
-        Self { parts, highest_mm }
+        Self { parts, highest_mm, sums: OnceLock::new() }
     }
 
     fn x0(&self) -> f64 {
@@ -61,7 +68,8 @@ impl Run {
 /// The outline.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {
-    runs: Vec<Run>,
+    /// Shared with the chains that it was before, as far as they are the same.
+    runs: Vec<Arc<Run>>,
     /// Parts that a curve was held against so far.
     looked_at: usize,
 }
@@ -75,7 +83,7 @@ impl Chain {
             step_owner: None,
         });
         let parts: Vec<Part> = parts.collect();
-        Self { runs: parts.chunks(MOST).map(|run| Run::of(run.to_vec())).collect(), looked_at: 0 }
+        Self { runs: parts.chunks(MOST).map(|run| Arc::new(Run::of(run.to_vec()))).collect(), looked_at: 0 }
     }
 
     /// The parts from left to right.
@@ -99,7 +107,58 @@ impl Chain {
 
     /// Both ends, mm.
     pub(crate) fn ends(&self) -> [f64; 2] {
-        [self.runs.first().map_or(0.0, Run::x0), self.runs.last().map_or(0.0, Run::x1)]
+        [self.runs.first().map_or(0.0, |run| run.x0()), self.runs.last().map_or(0.0, |run| run.x1())]
+    }
+
+    /// Where it is no longer what another one is, from the first such place to the last, mm; none where both are one. What they share
+    /// is not looked at.
+    pub(crate) fn differs_from(&self, other: &Self) -> Option<[f64; 2]> {
+        let count = self.runs.len().min(other.runs.len());
+        let (own, its) = (&self.runs, &other.runs);
+        let head = (0..count).take_while(|&i| Arc::ptr_eq(&own[i], &its[i])).count();
+        let tail =
+            (0..count - head).take_while(|&i| Arc::ptr_eq(&own[own.len() - 1 - i], &its[its.len() - 1 - i])).count();
+        let left = |runs: &[Arc<Run>]| -> Vec<Piece> {
+            runs[head..runs.len() - tail].iter().flat_map(|run| &run.parts).map(|part| part.piece).collect()
+        };
+        let (own, its) = (left(own), left(its));
+        let count = own.len().min(its.len());
+        let head = (0..count).take_while(|&i| own[i] == its[i]).count();
+        let tail = (0..count - head).take_while(|&i| own[own.len() - 1 - i] == its[its.len() - 1 - i]).count();
+        let (own, its) = (&own[head..own.len() - tail], &its[head..its.len() - tail]);
+        let all = || own.iter().chain(its);
+        let first = all().map(|piece| piece.x0).reduce(f64::min)?;
+        Some([first, all().map(|piece| piece.x1).fold(first, f64::max)])
+    }
+
+    /// Sums over a stretch of what a function sums over parts of pieces; those over whole runs are kept, so that every chain that
+    /// shares them has to be asked with the same function.
+    pub(crate) fn sums(&self, [from, to]: [f64; 2], of: impl Fn(Piece) -> Sums) -> Sums {
+        let mut all = [0.0; 3];
+        let mut add = |sums: Sums| (0..3).for_each(|k| all[k] += sums[k]);
+        for run in &self.runs[self.run_behind(from)..] {
+            if run.x0() >= to {
+                break;
+            }
+            if from <= run.x0() && run.x1() <= to {
+                add(*run.sums.get_or_init(|| {
+                    let mut all = [0.0; 3];
+                    run.parts.iter().for_each(|part| {
+                        let sums = of(part.piece);
+                        (0..3).for_each(|k| all[k] += sums[k]);
+                    });
+                    all
+                }));
+                continue;
+            }
+            for part in &run.parts {
+                let (x0, x1) = (part.piece.x0.max(from), part.piece.x1.min(to));
+                if x1 > x0 {
+                    add(of(Piece { x0, x1, curve: part.piece.curve }));
+                }
+            }
+        }
+        all
     }
 
     /// Parts that a curve was held against since this was asked last, runs that were passed over as well.
@@ -140,7 +199,7 @@ impl Chain {
     pub(crate) fn cut(&mut self, piece: &Piece, owner: usize) {
         let mut at = self.run_behind(piece.x0 + SAME_MM);
         while self.runs.get(at).is_some_and(|run| run.x0() < piece.x1 - SAME_MM) {
-            let run = &mut self.runs[at];
+            let run = &self.runs[at];
             self.looked_at += 1;
             if run.above_at_most(piece) <= -CONTACT_MM {
                 at += 1;
@@ -163,23 +222,23 @@ impl Chain {
     /// Puts parts of a run in the place of others; those that are one with their neighbour become one. Gives the last run
     /// that has any of them.
     fn replace(&mut self, at: usize, range: std::ops::Range<usize>, made: &[Part]) -> usize {
-        let run = &mut self.runs[at];
+        let run = &self.runs[at];
         let mut joined: Vec<Part> = Vec::with_capacity(run.parts.len() + made.len());
         let (before, behind) = (&run.parts[..range.start], &run.parts[range.end..]);
         before.iter().chain(made).chain(behind).for_each(|part| join(&mut joined, part));
         if joined.len() > MOST {
             let behind = joined.split_off(joined.len() / 2);
-            *run = Run::of(joined);
-            self.runs.insert(at + 1, Run::of(behind));
+            self.runs[at] = Arc::new(Run::of(joined));
+            self.runs.insert(at + 1, Arc::new(Run::of(behind)));
             return at + 1;
         }
-        *run = Run::of(joined);
-        let is_few = |pair: &[Run]| pair.iter().map(|run| run.parts.len()).sum::<usize>() <= FEW;
+        self.runs[at] = Arc::new(Run::of(joined));
+        let is_few = |pair: &[Arc<Run>]| pair.iter().map(|run| run.parts.len()).sum::<usize>() <= FEW;
         if at > 0 && is_few(&self.runs[at - 1..=at]) {
             let own = self.runs.remove(at);
-            let mut parts = std::mem::take(&mut self.runs[at - 1].parts);
+            let mut parts = self.runs[at - 1].parts.clone();
             own.parts.iter().for_each(|part| join(&mut parts, part));
-            self.runs[at - 1] = Run::of(parts);
+            self.runs[at - 1] = Arc::new(Run::of(parts));
             return at - 1;
         }
         at
@@ -189,11 +248,16 @@ impl Chain {
     pub(crate) fn touch_wall(&mut self, x: f64, from: f64, owner: usize) {
         let first = self.runs.partition_point(|run| run.x1() < x - CONTACT_MM);
         let mut left = first.checked_sub(1).and_then(|before| self.runs[before].parts.last()).map(|part| part.piece);
-        for run in &mut self.runs[first..] {
-            if run.x0() > x + CONTACT_MM {
+        for shared in &mut self.runs[first..] {
+            if shared.x0() > x + CONTACT_MM {
                 break;
             }
-            let near = run.parts.partition_point(|part| part.piece.x0 < x - CONTACT_MM);
+            let near = shared.parts.partition_point(|part| part.piece.x0 < x - CONTACT_MM);
+            if !shared.parts[near..].first().is_some_and(|part| part.piece.x0 <= x + CONTACT_MM) {
+                left = shared.parts.last().map(|part| part.piece);
+                continue;
+            }
+            let run = Arc::make_mut(shared);
             if let Some(before) = near.checked_sub(1) {
                 left = Some(run.parts[before].piece);
             }

@@ -8,10 +8,10 @@ mod curve;
 mod rigid;
 mod sweep;
 
-pub(crate) use chain::{Chain, Part};
-pub(crate) use curve::{Curve, SAME_MM};
+pub(crate) use chain::{Chain, Part, Sums};
+pub(crate) use curve::{Curve, Piece, SAME_MM};
 pub(crate) use rigid::{
-    Doubt, FAILURE_CODES, Stroke, Turned, blank, doubt, implausible_mm, lines_that_finish, strokes, turned,
+    Doubt, FAILURE_CODES, Stroke, Turned, blank, doubt, implausible_mm, lines_that_finish, outline, strokes, turned,
     zero_that_fits,
 };
 pub(crate) use sweep::{Shape, Way};

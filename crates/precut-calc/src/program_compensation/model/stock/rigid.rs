@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::calculator::{Failure, Finding, Monitor, Pace};
 
-use super::super::super::job::{Job, ProgramStock, ProgramTool};
+use super::super::super::job::{Job, KeepOut, ProgramStock, ProgramTool, StockRow};
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
@@ -30,6 +30,8 @@ pub(crate) struct Turned {
     pub(crate) owned: BTreeMap<usize, f64>,
     /// The first rapid move through stock of each line.
     pub(crate) in_stock: Vec<InStock>,
+    /// The first move of each line into a place where no tool may come.
+    pub(crate) hits: Vec<Hit>,
     /// Whether anything is cut.
     pub(crate) cuts: bool,
     /// The first cut along the axis: across it a cut may well be as deep as the work is thick.
@@ -40,6 +42,15 @@ pub(crate) struct Turned {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct InStock {
     pub(crate) line: usize,
+    pub(crate) depth_mm: f64,
+}
+
+/// A move into a place where no tool may come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hit {
+    pub(crate) line: usize,
+    /// Which of the places, from 0.
+    pub(crate) place: usize,
     pub(crate) depth_mm: f64,
 }
 
@@ -174,8 +185,18 @@ pub(crate) fn strokes<'p>(program: &'p Program, job: &'p Job, zero: f64) -> impl
 
 /// The outline of a blank.
 pub(crate) fn blank(stock: &ProgramStock) -> Chain {
-    let rows: Vec<[f64; 2]> = stock.profile.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
+    outline(&stock.profile)
+}
+
+/// An outline of places and diameters.
+pub(crate) fn outline(rows: &[StockRow]) -> Chain {
+    let rows: Vec<[f64; 2]> = rows.iter().map(|row| [row.z_mm, 0.5 * row.diameter_mm]).collect();
     Chain::of(&rows)
+}
+
+fn cylinder(keep_out: &KeepOut) -> Chain {
+    let radius = 0.5 * keep_out.diameter_mm;
+    Chain::of(&[[keep_out.z_start_mm, radius], [keep_out.z_end_mm, radius]])
 }
 
 /// Drives a program over its blank.
@@ -197,11 +218,25 @@ pub(crate) fn turned(
         return Err(Failure::OutOfModel(finding));
     }
     let mut chain = blank(stock);
-    let mut turned =
-        Turned { parts: Vec::new(), owned: BTreeMap::new(), in_stock: Vec::new(), cuts: false, first_cut: None };
+    let mut turned = Turned {
+        parts: Vec::new(),
+        owned: BTreeMap::new(),
+        in_stock: Vec::new(),
+        hits: Vec::new(),
+        cuts: false,
+        first_cut: None,
+    };
+    let mut kept_out: Vec<Chain> = job.keep_out.iter().map(cylinder).collect();
     let mut pace = Pace::new(monitor);
     for Stroke { one, shape, way, .. } in strokes(program, job, zero) {
-        pace.work(WORK_OF_MOVE + chain.take_looked_at() * WORK_OF_PART)?;
+        pace.work(WORK_OF_MOVE * (1 + kept_out.len()) + chain.take_looked_at() * WORK_OF_PART)?;
+        for (place, kept_out) in kept_out.iter_mut().enumerate() {
+            let depth_mm = kept_out.depth_of(&shape, &way);
+            let is_told = turned.hits.iter().rev().take_while(|hit| hit.line == one.line).any(|hit| hit.place == place);
+            if depth_mm > CONTACT_MM && !is_told {
+                turned.hits.push(Hit { line: one.line, place, depth_mm });
+            }
+        }
         if one.kind == Kind::Rapid {
             let depth_mm = chain.depth_of(&shape, &way);
             let is_told = turned.in_stock.last().is_some_and(|last| last.line == one.line);

@@ -27,10 +27,15 @@ pub(crate) struct ContourError {
 
 /// The error along what the program makes of the contour.
 pub(crate) fn contour(yielded: &Yielded) -> Vec<ContourError> {
+    between(&yielded.nominal, &yielded.real)
+}
+
+/// The error of an outline along what a program makes of another one.
+pub(crate) fn between(nominal: &[Part], real: &[Part]) -> Vec<ContourError> {
     let mut found = Vec::new();
-    for part in &yielded.nominal {
+    for part in nominal {
         if let Some(line) = part.owner {
-            along_part(part, line, &yielded.real, &mut found);
+            along_part(part, line, real, &mut found);
         }
     }
     found

@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::calculator::{self, Failure, Finding, Monitor};
-use crate::deflection_compensation::{FeedDirection, Holding, ToolPlace};
+use crate::deflection_compensation::{FeedDirection, Holding, Support, Theory, ToolPlace};
 use crate::force::ForceModel;
 
 use super::super::super::job::{Job, ProgramStock};
 use super::super::reader::{Kind, Program};
 use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
-use super::sections::slices;
+use super::sections::{Lumps, slices};
 
 /// Why a program is not driven over a blank that yields.
 pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_hold", "formula_without_value"];
@@ -32,6 +32,11 @@ const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
 /// Steps of the stock that get places of their own.
 const MOST_STEPS: usize = 200;
+/// A cut that is meant is deeper, and a move through the air that is told longer, mm.
+const MEANT_MM: f64 = 1e-3;
+const AIR_MM: f64 = 20.0;
+/// The work is as its outline has it so far beside the tool, mm.
+const BESIDE_MM: f64 = 1.0;
 /// Multiplications for a place of a move.
 const WORK_OF_PLACE: usize = 20_000;
 /// A feed that climbs by more turns a force law that was measured along the axis, rad.
@@ -53,10 +58,12 @@ pub(crate) struct Driven<'a> {
     pub(crate) finishing: &'a [usize],
     /// Moves that come out as they are meant: at their places stands what the tool has to be set in for that.
     pub(crate) corrected: &'a BTreeSet<usize>,
-    /// Of a corrected program the one that was given, and of which of its moves every move is a piece: the work bends as
-    /// the part that it means.
-    pub(crate) given: Option<(&'a Program, &'a [usize])>,
+    /// What some moves leave instead of their own way: the work bends as these leave it.
+    pub(crate) bends_as: Option<&'a Instead>,
 }
+
+/// Ways of a tool instead of those of moves, by the moves.
+pub(crate) type Instead = BTreeMap<usize, Vec<(Shape, Way)>>;
 
 /// What a program leaves where work and machine yield.
 #[derive(Debug, Clone)]
@@ -70,6 +77,19 @@ pub(crate) struct Yielded {
     pub(crate) nominal: Vec<Part>,
     /// Lines that cut in another direction than the force law was measured in.
     pub(crate) turned_lines: BTreeSet<usize>,
+    /// Lines that mean to cut and find nothing left to cut.
+    pub(crate) missed_lines: BTreeSet<usize>,
+    /// Long moves at the feed that cut nothing and do not mean to.
+    pub(crate) in_air: Vec<InAir>,
+}
+
+/// A move at the feed through the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct InAir {
+    pub(crate) line: usize,
+    pub(crate) length_mm: f64,
+    /// None where the speed is not known.
+    pub(crate) time_min: Option<f64>,
 }
 
 /// How far a rapid move stays off the work, across the axis.
@@ -81,35 +101,24 @@ pub(crate) struct Clearance {
     pub(crate) gap_mm: f64,
 }
 
-/// The work as the section of the beam has it: before and after a move of the program that is meant.
+/// The work as the section of the beam has it: before and after a move that does not yield.
 struct Meant {
-    /// Of a corrected program the moves of the given one.
-    given: Option<BTreeMap<usize, (Shape, Way)>>,
-    at: Option<usize>,
     before: Chain,
     after: Chain,
 }
 
 impl Meant {
-    fn of(driven: Driven<'_>, job: &Job, (stock, zero): (&ProgramStock, f64)) -> Self {
-        let given = driven.given.map(|(program, _)| {
-            let feeds = strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed());
-            feeds.map(|stroke| (stroke.index, (stroke.shape, stroke.way))).collect()
-        });
-        Self { given, at: None, before: blank(stock), after: blank(stock) }
-    }
-
-    /// Comes to a move, be it the next one or a further piece of the last.
-    fn come_to(&mut self, stroke: &Stroke<'_>, driven: Driven<'_>) {
-        let mv = driven.given.and_then(|(_, of)| of.get(stroke.index).copied()).unwrap_or(stroke.index);
-        if self.at == Some(mv) {
-            return;
-        }
-        self.at = Some(mv);
+    /// Comes to the next move.
+    fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
         self.before.clone_from(&self.after);
-        let own = (stroke.shape, stroke.way);
-        let (shape, way) = self.given.as_ref().and_then(|given| given.get(&mv)).copied().unwrap_or(own);
-        self.after.turn(&shape, &way, stroke.one.line);
+        match bends_as.and_then(|ways| ways.get(&stroke.index)) {
+            Some(ways) => ways.iter().for_each(|(shape, way)| {
+                self.after.turn(shape, way, stroke.one.line);
+            }),
+            None => {
+                self.after.turn(&stroke.shape, &stroke.way, stroke.one.line);
+            }
+        }
     }
 }
 
@@ -129,7 +138,7 @@ pub(crate) fn yielding(
     driven: Driven<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Yielded, Failure> {
-    let mut meant = Meant::of(driven, job, (stock, zero));
+    let mut meant = Meant { before: blank(stock), after: blank(stock) };
     let mut real = blank(stock);
     let mut yielded = Yielded {
         places: Vec::new(),
@@ -137,6 +146,8 @@ pub(crate) fn yielding(
         real: Vec::new(),
         nominal: Vec::new(),
         turned_lines: BTreeSet::new(),
+        missed_lines: BTreeSet::new(),
+        in_air: Vec::new(),
     };
     let mut so_far = SoFar::default();
     // The last move that was still cutting when it ended.
@@ -153,11 +164,12 @@ pub(crate) fn yielding(
         if !one.kind.is_feed() {
             continue;
         }
-        meant.come_to(&stroke, driven);
+        meant.come_to(&stroke, driven.bends_as);
         if real.depth_of(shape, way) <= CHIP_MM {
+            yielded.find_nothing(&stroke, meant.before.depth_of(shape, way));
             continue;
         }
-        let acts = acts(job, one.line);
+        let acts = acts(job, program.executed_at(stroke.index));
         if !holding.is_held_by(&acts) {
             return Err(refused("supports_do_not_hold", one.line));
         }
@@ -166,7 +178,9 @@ pub(crate) fn yielding(
             return Err(refused("speed_missing", one.line));
         }
         let bore_mm = stock.bore_diameter_mm;
-        let held = holding.hold(&slices(&meant.before, &meant.after, bore_mm), &acts, direction(way))?;
+        let lumps = lumps(holding, &meant, way);
+        let held =
+            holding.hold(&slices(&meant.before, &meant.after, bore_mm, lumps.as_ref()), &acts, direction(way))?;
         let cutting = Cutting {
             stroke: &stroke,
             held: &held,
@@ -178,7 +192,7 @@ pub(crate) fn yielding(
             is_corrected: driven.corrected.contains(&stroke.index),
         };
         let is_corrected = cutting.is_corrected;
-        let straight_mm = STRAIGHT_MM[usize::from(!driven.finishing.contains(&one.line))];
+        let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
         let from = cutting.meets_from();
         let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
         let mut places = along.places()?;
@@ -213,6 +227,39 @@ pub(crate) fn yielding(
     yielded.real = real.parts();
     yielded.nominal = meant.after.parts();
     Ok(yielded)
+}
+
+/// Where the work bends as a few slices do: everywhere but about the tool, unless its weight counts, or
+/// shear, or a rest goes with the tool.
+fn lumps(holding: &Holding, meant: &Meant, way: &Way) -> Option<Lumps> {
+    let supports_mm: Option<Vec<f64>> = holding.supports.iter().map(Support::station_mm).collect();
+    let supports_mm = supports_mm?;
+    if holding.weight || holding.shaft.theory == Some(Theory::Timoshenko) {
+        return None;
+    }
+    let [from, to] = way.ends().map(|[x, _]| x);
+    let turned = meant.before.differs_from(&meant.after).unwrap_or([from, from]);
+    // An arc may reach farther than its ends.
+    let beyond = if let Way::Arc { radius, .. } = way { *radius } else { 0.0 };
+    let low = from.min(to).min(turned[0]) - beyond - BESIDE_MM;
+    let high = from.max(to).max(turned[1]) + beyond + BESIDE_MM;
+    Some(Lumps { near_mm: [low, high], supports_mm })
+}
+
+impl Yielded {
+    /// Keeps a move at the feed that cuts nothing, with the depth that it would have, did nothing yield.
+    fn find_nothing(&mut self, stroke: &Stroke<'_>, meant_mm: f64) {
+        let (line, length_mm) = (stroke.one.line, stroke.way.length_mm());
+        if meant_mm > MEANT_MM {
+            self.missed_lines.insert(line);
+        } else if length_mm > AIR_MM {
+            let pace = Pace { feed: stroke.one.feed, speed: stroke.one.speed };
+            let radius_mm = stroke.way.at(0.5)[1].max(AXIS_MM);
+            let per_min = pace.feed_mm_per_rev(radius_mm).zip(pace.rpm(radius_mm)).map(|(feed, rpm)| feed * rpm);
+            let time_min = per_min.filter(|per_min| *per_min > 0.0).map(|per_min| length_mm / per_min);
+            self.in_air.push(InAir { line, length_mm, time_min });
+        }
+    }
 }
 
 fn refused(code: &'static str, line: usize) -> Failure {

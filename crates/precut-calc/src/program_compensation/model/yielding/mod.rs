@@ -10,6 +10,6 @@ mod drive;
 mod outline;
 mod sections;
 
-pub(crate) use contour::{ContourError, contour};
-pub(crate) use cut::{AXIS_MM, CutPlace};
-pub(crate) use drive::{Driven, FAILURE_CODES, PlaceOfMove, Yielded, yielding};
+pub(crate) use contour::{ContourError, between, contour};
+pub(crate) use cut::{AXIS_MM, CutPlace, Pace};
+pub(crate) use drive::{Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};
