@@ -1,57 +1,16 @@
 //! A process under watch: order of arrival, odd parts, changes of what the model holds, false alarms, bounded memory.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use crate::process_support::{Document, Part, process, stream};
-use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
-use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint};
+use crate::process_support::{Shop, process, replay, stream};
+use precut_calc::calculator::Unwatched;
+use precut_calc::deflection_compensation::DeflectionCompensation;
 use precut_calc::effects::DeflectionEffect;
 use precut_calc::num::stats::Resampler;
 use precut_calc::process::{ActionKind, Situation, State, Unused, Watch, faults};
 use serde_json::json;
-use std::ops::RangeInclusive;
-
-fn replay(document: &Document, parts: &[Part]) -> (Watch<DeflectionCompensation>, Vec<State>) {
-    Watch::replay(document.clone(), parts, &Unwatched).unwrap()
-}
 
 fn bytes(states: &[State]) -> Vec<u8> {
     serde_json::to_vec(states).unwrap()
-}
-
-/// Parts of one process with its own scatter and nothing else; `acting` tells what acts beside the job in a part.
-struct Shop {
-    document: Document,
-    random: Resampler,
-    template: Part,
-}
-
-impl Shop {
-    fn new(seed: u64) -> Self {
-        let (mut document, parts) = process(&stream("r10-nothing-300.json"));
-        document.options.false_alarm_every_parts = 500;
-        Self { document, random: Resampler::new(seed, 3), template: parts[0].clone() }
-    }
-
-    fn parts(&mut self, count: u32, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
-        self.cut(1..=count, acting)
-    }
-
-    fn cut(&mut self, numbers: RangeInclusive<u32>, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
-        let job = &self.document.part_types["A"].job;
-        let points = self.template.measurements.iter().map(|row| (0, DeflectionPoint { z_mm: row.z_mm })).collect();
-        let rows = Rows { runs: vec![self.template.conditions.clone()], points };
-        let prepared = DeflectionCompensation::prepare(job, &rows, &self.document.quantity, &Unwatched).unwrap();
-        let mut part = |number: u32| {
-            let predicted = DeflectionCompensation::predict(&prepared, &acting(number), &Unwatched).unwrap();
-            let (setup_um, force) = (self.random.normal(), 1.0 + 0.007 * self.random.normal());
-            let mut part = Part { number, ..self.template.clone() };
-            for (row, um) in part.measurements.iter_mut().zip(predicted) {
-                row.diameter_deviation_um = Some(um.unwrap() * force + setup_um + self.random.normal());
-            }
-            part
-        };
-        numbers.map(&mut part).collect()
-    }
 }
 
 #[test]

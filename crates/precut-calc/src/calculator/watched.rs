@@ -25,6 +25,23 @@ pub trait Watched: Diagnosable {
 
     /// What the drawing allows.
     fn limits(job: &Self::Job) -> Limits;
+
+    /// What of a run decides the path that the calculator gives for a job: without a path of its own, and without conditions
+    /// that no effect of the job goes with.
+    fn deciding(job: &Self::Job, run: &Self::Run) -> Self::Run;
+
+    /// A run on the path of another one; on the nominal one where that has none of its own.
+    fn on_path_of(run: &Self::Run, other: &Self::Run) -> Self::Run;
+
+    /// A run on the path that the calculator gives for a job under its conditions; `None` where it gives none.
+    fn compensated(job: &Self::Job, run: &Self::Run, monitor: &dyn Monitor) -> Result<Option<Self::Run>, Failure>;
+
+    /// The job under the conditions of a run, with these effects instead of its own. The path is its answer, so that of the run
+    /// is not looked at.
+    fn under(job: &Self::Job, run: &Self::Run, effects: Vec<Self::Effect>) -> Self::Job;
+
+    /// A place along the part, as a share of its length.
+    fn point_along(job: &Self::Job, share: f64) -> Self::Point;
 }
 
 /// What a drawing allows of the diameter along a part.

@@ -2,7 +2,7 @@
 
 use super::memory::Memory;
 use super::null::Gram;
-use super::sight::{COSINES, GAUGE, Sighting};
+use super::sight::{COSINES, GAUGE};
 use super::state::{ChangedCause, Measure};
 use super::watch::{PartOf, Watch};
 use crate::calculator::{Failure, Measurement, Monitor, Ranges, Rows, Watched};
@@ -67,11 +67,7 @@ fn gram_of<M: Watched>(watch: &mut Watch<M>, part: &PartOf<M>, monitor: &dyn Mon
         Err(_) => return Ok(None),
     };
     let Some(scatter) = &watch.memory.scatter else { return Ok(None) };
-    let rows = signs.base.len();
-    let (keep, kind) = (signs.predicted.clone(), watch.eye.kind(part)?);
-    let (value, residual) = (vec![0.0; rows], vec![0.0; rows]);
-    let (number, checks) = (part.number, Vec::new());
-    let sighting = Sighting { number, ordinal: 0, kind, signs, value, residual, keep, checks, odd: false };
+    let sighting = signs.unmeasured(part.number, watch.eye.kind(part)?);
     Ok(Some(Gram::of(&sighting, scatter, &catalogue)))
 }
 

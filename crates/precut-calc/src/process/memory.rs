@@ -32,6 +32,7 @@ const LEARN_AFTER: [usize; 3] = [40, 80, 160];
 const MOST_CHANGES: usize = 6;
 
 /// All that is remembered of the parts.
+#[derive(Clone)]
 pub(super) struct Memory {
     pub(super) options: Options,
     pub(super) noise: Option<f64>,
@@ -49,6 +50,8 @@ pub(super) struct Memory {
     pub(super) first: u32,
     pub(super) pending: Option<Pending>,
     pub(super) accepted: Vec<Accepted>,
+    /// How many changes ever joined the model.
+    pub(super) joined: usize,
     pub(super) reported: usize,
     pub(super) changes: Vec<Change>,
     pub(super) odd: Vec<OddPart>,
@@ -75,6 +78,7 @@ impl Memory {
             first: 0,
             pending: None,
             accepted: Vec::new(),
+            joined: 0,
             reported: 0,
             changes: Vec::new(),
             odd: Vec::new(),

@@ -1,5 +1,6 @@
 //! A process, part by part.
 
+use super::account::Account;
 use super::document::{Document, Part};
 use super::memory::Memory;
 use super::sight::{Eye, Sighting, used};
@@ -19,6 +20,7 @@ pub struct Watch<M: Watched> {
     pub(super) eye: Eye<M>,
     pub(super) memory: Memory,
     pub(super) last: Option<PartOf<M>>,
+    pub(super) account: Account<M>,
 }
 
 impl<M: Watched> Watch<M> {
@@ -26,7 +28,8 @@ impl<M: Watched> Watch<M> {
     pub fn new(document: DocumentOf<M>) -> Self {
         let noise = document.noise_um.map(|um| um * M::per_diameter_um(&document.quantity));
         let memory = Memory::new(document.options.clone(), noise);
-        Self { eye: Eye::new(document), memory, last: None }
+        let account = Account::new(&document);
+        Self { eye: Eye::new(document), memory, last: None, account }
     }
 
     /// All parts, in whatever order they stand: the state after each, by ascending number.
@@ -59,7 +62,20 @@ impl<M: Watched> Watch<M> {
         let (keep, checks, number) = (signs.predicted.clone(), part.gauge_checks.clone(), part.number);
         let sighting = Sighting { number, ordinal, kind, signs, value, residual, keep, checks, odd: false };
         self.last = Some(part.clone());
-        self.memory.take(sighting, monitor)
+        let state = self.memory.take(sighting, monitor)?;
+        self.book(part, &state, monitor)?;
+        Ok(state)
+    }
+
+    /// The same once more: what comes to one of them does not come to the other.
+    #[must_use]
+    pub fn copy(&self) -> Self {
+        Self {
+            eye: self.eye.copy(),
+            memory: self.memory.clone(),
+            last: self.last.clone(),
+            account: self.account.copy(),
+        }
     }
 
     /// How many parts and how many onsets are in memory, and how many columns are free: bounded, however many parts came.
