@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
+    TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
@@ -23,7 +23,7 @@ use super::input::{Aim, FeedDirection, IncludeMode, Job, Stations, Theory, Toler
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, wanted};
 use super::next_runs::next_runs;
-use super::regime::{Regime, Step, passages, section_of_pass};
+use super::regime::{Regime, Step, cut_path_m, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
 const UM_PER_MM: f64 = 1e3;
@@ -454,6 +454,31 @@ impl Watched for DeflectionCompensation {
 
     fn path_m(run: &DeflectionRun) -> Option<f64> {
         run.tool_path_at_start_m
+    }
+
+    fn at_path_m(run: &DeflectionRun, path_m: Option<f64>) -> DeflectionRun {
+        DeflectionRun { tool_path_at_start_m: path_m, ..run.clone() }
+    }
+
+    fn cut_path_m(job: &Job, run: &DeflectionRun) -> f64 {
+        let job = under(job, run);
+        cut_path_m(&job, &Regime::of(&job.cut))
+    }
+
+    fn telling_runs(job: &Job, run: &DeflectionRun) -> Vec<TellingRun<DeflectionRun>> {
+        let turned = job.shaft.segments.iter().map(|own| 0.5 * (own.stock_mm() - own.diameter_mm));
+        let depth_mm = run.depth_mm.unwrap_or_else(|| turned.fold(0.0, f64::max));
+        // On the nominal path: that of a part is made for its own depth.
+        let at = |code, share: f64| TellingRun {
+            code,
+            condition: ("depth_mm", share * depth_mm),
+            run: DeflectionRun { depth_mm: Some(share * depth_mm), commanded_path: Vec::new(), ..run.clone() },
+        };
+        if depth_mm > 0.0 {
+            vec![at("other_depth", 0.5), at("other_depth", 1.5), at("air_cut", 0.02)]
+        } else {
+            Vec::new()
+        }
     }
 
     fn limits(job: &Job) -> Limits {

@@ -4,7 +4,7 @@
 //! A part is one run of a diagnosis: prediction, catalogue, scatter and allowances are those of [`crate::diagnosis`]. What is
 //! added is time:
 //!
-//! - `document`, `check`: what a process and a part are, and every fault of them;
+//! - `document`, `check`, `edges`: what a process and a part are, every fault of them, and what an edge has cut;
 //! - `sight`: what a part shows of each cause, linearised about the model (`process/3.1`);
 //! - `scatter`: how far readings and parts scatter, learned from the parts themselves (`process/3.4`);
 //! - `null`: what is free although nothing changed, and what parts tell of it (`process/3.1`);
@@ -24,6 +24,7 @@ mod action;
 mod check;
 mod detector;
 mod document;
+mod edges;
 mod follow;
 mod measure;
 mod memory;

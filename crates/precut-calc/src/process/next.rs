@@ -78,7 +78,7 @@ impl<M: Watched> Watch<M> {
 }
 
 /// From where to where a part is measured, as shares of its length.
-fn measured_over<M: Watched>(job: &<M as Calculator>::Input, rows: &[M::Row]) -> Option<[f64; 2]> {
+pub(super) fn measured_over<M: Watched>(job: &<M as Calculator>::Input, rows: &[M::Row]) -> Option<[f64; 2]> {
     let place = |point: &M::Point| M::place(point).first().and_then(|(_, place)| *place);
     let (from, to) = (place(&M::point_along(job, 0.0))?, place(&M::point_along(job, 1.0))?);
     let shares =

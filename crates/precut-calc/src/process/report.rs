@@ -19,6 +19,7 @@ pub const EXPLANATION_CODES: &[&str] = &[
     "process_odd_part",
     "process_too_few_rows",
     "process_copied_rows",
+    "process_unit_suspected",
     "process_measure_again",
 ];
 
@@ -98,6 +99,7 @@ pub(super) fn explanation(state: &State, options: &Options) -> Vec<Message> {
         let code = match unused {
             Unused::TooFewRows => "process_too_few_rows",
             Unused::CopiedRows => "process_copied_rows",
+            Unused::UnitSuspected => "process_unit_suspected",
             Unused::MeasureAgain => "process_measure_again",
         };
         said.push(Message::new(code).with("part", number));

@@ -42,6 +42,17 @@ pub(super) struct Variant {
     pub(super) in_null: bool,
 }
 
+impl Variant {
+    /// Least and largest change, in prior standard deviations. Of what is free although nothing changed nobody knows from where
+    /// it changes: it has no bounds.
+    pub(super) fn reach(&self) -> [f64; 2] {
+        if self.in_null {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        self.range.map(|end| end / self.prior_sd)
+    }
+}
+
 /// All causes that the parts so far can speak of.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Catalogue {

@@ -27,6 +27,8 @@ pub enum Unused {
     TooFewRows,
     /// The rows are those of an earlier part to the last digit.
     CopiedRows,
+    /// The rows are those before times a factor, as a wrong unit leaves.
+    UnitSuspected,
     /// Too many rows stand alone.
     MeasureAgain,
 }
@@ -290,6 +292,12 @@ pub struct Measure {
     /// The condition to change, where one is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub condition: Option<&'static str>,
+    /// Its value, in the unit of the condition's field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// How many stations along the part, where more than now.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stations: Option<usize>,
     /// Which two causes it tells apart.
     pub decides: [String; 2],
     /// By how much: expected Bayes factor of one such part or reading.

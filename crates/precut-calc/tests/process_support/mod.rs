@@ -1,6 +1,8 @@
 //! Streams of parts with a known truth.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+pub(crate) mod series;
+
 use precut_calc::calculator::{Calculator, ForwardModel, Rows, Unwatched};
 use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint, DeflectionRun, Job};
 use precut_calc::effects::DeflectionEffect;
