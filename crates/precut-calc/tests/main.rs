@@ -85,6 +85,8 @@ mod machinability_real;
 mod material_library;
 mod milling_reference;
 mod path_chords;
+mod process_figures;
+mod process_gain;
 mod process_streams;
 mod process_support;
 mod process_watch;

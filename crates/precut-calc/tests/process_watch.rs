@@ -1,57 +1,16 @@
 //! A process under watch: order of arrival, odd parts, changes of what the model holds, false alarms, bounded memory.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use crate::process_support::{Document, Part, process, stream};
-use precut_calc::calculator::{ForwardModel, Rows, Unwatched};
-use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint};
+use crate::process_support::{Part, Shop, process, replay, stream};
+use precut_calc::calculator::Unwatched;
+use precut_calc::deflection_compensation::DeflectionCompensation;
 use precut_calc::effects::DeflectionEffect;
 use precut_calc::num::stats::Resampler;
 use precut_calc::process::{ActionKind, Situation, State, Unused, Watch, faults};
 use serde_json::json;
-use std::ops::RangeInclusive;
-
-fn replay(document: &Document, parts: &[Part]) -> (Watch<DeflectionCompensation>, Vec<State>) {
-    Watch::replay(document.clone(), parts, &Unwatched).unwrap()
-}
 
 fn bytes(states: &[State]) -> Vec<u8> {
     serde_json::to_vec(states).unwrap()
-}
-
-/// Parts of one process with its own scatter and nothing else; `acting` tells what acts beside the job in a part.
-struct Shop {
-    document: Document,
-    random: Resampler,
-    template: Part,
-}
-
-impl Shop {
-    fn new(seed: u64) -> Self {
-        let (mut document, parts) = process(&stream("r10-nothing-300.json"));
-        document.options.false_alarm_every_parts = 500;
-        Self { document, random: Resampler::new(seed, 3), template: parts[0].clone() }
-    }
-
-    fn parts(&mut self, count: u32, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
-        self.cut(1..=count, acting)
-    }
-
-    fn cut(&mut self, numbers: RangeInclusive<u32>, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
-        let job = &self.document.part_types["A"].job;
-        let points = self.template.measurements.iter().map(|row| (0, DeflectionPoint { z_mm: row.z_mm })).collect();
-        let rows = Rows { runs: vec![self.template.conditions.clone()], points };
-        let prepared = DeflectionCompensation::prepare(job, &rows, &self.document.quantity, &Unwatched).unwrap();
-        let mut part = |number: u32| {
-            let predicted = DeflectionCompensation::predict(&prepared, &acting(number), &Unwatched).unwrap();
-            let (setup_um, force) = (self.random.normal(), 1.0 + 0.007 * self.random.normal());
-            let mut part = Part { number, ..self.template.clone() };
-            for (row, um) in part.measurements.iter_mut().zip(predicted) {
-                row.diameter_deviation_um = Some(um.unwrap() * force + setup_um + self.random.normal());
-            }
-            part
-        };
-        numbers.map(&mut part).collect()
-    }
 }
 
 #[test]
@@ -211,6 +170,9 @@ fn copied_rows_are_not_used_and_a_coarse_gauge_copies_nothing() {
     let (_, states) = replay(&document, &parts);
     let unused: Vec<_> = states.iter().filter_map(|state| Some((state.number, state.unused?))).collect();
     assert_eq!(unused, [(35, Unused::CopiedRows)]);
+    // A person looked at it.
+    parts[34].confirmed = true;
+    assert!(replay(&document, &parts).1.iter().all(|state| state.unused.is_none()));
     // Four rows to the micrometre agree by chance.
     for part in &mut parts {
         part.measurements.truncate(4);
@@ -221,6 +183,84 @@ fn copied_rows_are_not_used_and_a_coarse_gauge_copies_nothing() {
     assert!(replay(&document, &parts).1.iter().all(|state| state.unused.is_none()));
     parts[30].measurements.truncate(3);
     assert_eq!(replay(&document, &parts).1[30].unused, Some(Unused::TooFewRows));
+}
+
+#[test]
+fn rows_in_another_unit_are_not_used_until_they_are_confirmed() {
+    let (document, parts) = process(&stream("r10-nothing-300.json"));
+    let mut parts = parts[..30].to_vec();
+    let (mut before, _) = replay(&document, &parts[..29]);
+    assert_eq!(before.doubts(&parts[29], &Unwatched).unwrap(), Vec::new());
+    let right = parts[29].clone();
+    for factor in [1000.0, 1.0 / 25.4, 0.5, -1.0, 2.1] {
+        parts[29] = right.clone();
+        for row in &mut parts[29].measurements {
+            row.diameter_deviation_um = row.diameter_deviation_um.map(|um| um * factor);
+        }
+        let doubts = before.doubts(&parts[29], &Unwatched).unwrap();
+        assert_eq!(doubts.iter().map(|doubt| doubt.code).collect::<Vec<_>>(), ["unit_suspected"], "{factor}");
+        let (_, states) = replay(&document, &parts);
+        assert_eq!(states[29].unused, Some(Unused::UnitSuspected), "{factor}");
+        parts[29].confirmed = true;
+        assert_eq!(before.doubts(&parts[29], &Unwatched).unwrap(), Vec::new());
+        assert_ne!(replay(&document, &parts).1[29].unused, Some(Unused::UnitSuspected));
+    }
+    // A part that is far off is no other unit.
+    parts[29] = right;
+    for row in &mut parts[29].measurements {
+        row.diameter_deviation_um = row.diameter_deviation_um.map(|um| um + 60.0);
+    }
+    assert_eq!(before.doubts(&parts[29], &Unwatched).unwrap(), Vec::new());
+}
+
+#[test]
+fn the_path_of_an_edge_is_the_sum_of_its_parts() {
+    let (document, parts) = process(&stream("r05-edges-wear-faster.json"));
+    let mut short = parts[..40].to_vec();
+    // Stated of the first part alone.
+    short.iter_mut().skip(1).for_each(|part| part.conditions.tool_path_at_start_m = None);
+    assert_eq!(faults::<DeflectionCompensation>(&document, &short), Vec::new());
+    let [summed, stated] = [&short[..], &parts[..40]].map(|parts| replay(&document, parts).1.pop().unwrap());
+    let apart = summed.evidence.unwrap() - stated.evidence.unwrap();
+    // The file has its paths to a millimetre.
+    assert!(apart.abs() < 1e-3, "{apart}");
+    // A part of the edge is missing: nobody knows what it cut.
+    short.remove(5);
+    let told = faults::<DeflectionCompensation>(&document, &short);
+    let at = "/parts/5/conditions/tool_path_at_start_m";
+    assert_eq!((told[0].code, told[0].pointer.as_str()), ("condition_missing", at));
+}
+
+#[test]
+fn what_to_measure_next_tells_the_leading_causes_apart() {
+    // A tailstock that softens by some 3 sigma, or moved: another depth tells.
+    let mut shop = Shop::new(33);
+    let acting = |number: u32| {
+        if number < 31 { Vec::new() } else { vec![DeflectionEffect::TailstockCompliance { delta_um_per_n: 0.0044 }] }
+    };
+    let mut parts = shop.parts(36, acting);
+    let (mut watch, _) = replay(&shop.document, &parts);
+    let outlook = watch.outlook(&Unwatched).unwrap().unwrap();
+    let codes: Vec<&str> = outlook.measure_next.iter().map(|measure| measure.code).collect();
+    for expected in ["another_part", "more_stations", "other_depth", "air_cut", "other_condition"] {
+        assert!(codes.contains(&expected), "{expected} is not among {codes:?}");
+    }
+    let worth = |code: &str| outlook.measure_next.iter().find(|own| own.code == code).unwrap().expected_bayes_factor;
+    assert!(worth("more_stations") > worth("another_part"));
+    // Done as it says: the depth that is best.
+    let best = outlook.measure_next.iter().find(|own| ["other_depth", "air_cut"].contains(&own.code)).unwrap();
+    shop.template.conditions.depth_mm = best.value;
+    let before = watch_share(&shop, &parts);
+    parts.extend(shop.cut(37..=42, acting));
+    let after = watch_share(&shop, &parts);
+    assert!(after > before.max(0.8), "{before} {after}");
+}
+
+/// Share of the tailstock's compliance in the first change.
+fn watch_share(shop: &Shop, parts: &[Part]) -> f64 {
+    let (_, states) = replay(&shop.document, parts);
+    let causes = &states.last().unwrap().changes[0].causes;
+    causes.iter().find(|cause| cause.kind == "tailstock_compliance").map_or(0.0, |cause| cause.share)
 }
 
 #[test]
@@ -243,9 +283,9 @@ fn every_fault_of_a_process_is_told_at_once() {
         ("out_of_range", "/options/bad_part_share"),
         ("number_taken", "/parts/1/number"),
         ("part_type_not_declared", "/parts/2/part_type"),
-        ("part_condition_missing", "/parts/3/conditions/warm_time_at_start_min"),
+        ("condition_missing", "/parts/3/conditions/warm_time_at_start_min"),
         ("station_outside_shaft", "/parts/4/measurements/2/z_mm"),
-        ("part_contradicts", "/parts/20/edge"),
+        ("condition_contradicts", "/parts/20/edge"),
     ] {
         assert!(told.contains(&expected), "{expected:?} is not among {told:?}");
     }

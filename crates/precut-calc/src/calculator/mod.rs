@@ -35,7 +35,7 @@ pub use program::{Block, Dialect, Program, ProgramEnd};
 pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
 pub(crate) use user_formula::{FormulaRoom, values_of_formula};
-pub use watched::{Limits, Watched};
+pub use watched::{Limits, TellingRun, Watched};
 
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;

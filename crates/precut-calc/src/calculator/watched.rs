@@ -23,8 +23,46 @@ pub trait Watched: Diagnosable {
     /// Path that the edge had cut when the run began.
     fn path_m(run: &Self::Run) -> Option<f64>;
 
+    /// A run with that path stated.
+    fn at_path_m(run: &Self::Run, path_m: Option<f64>) -> Self::Run;
+
+    /// Path that an edge cuts in a run, m.
+    fn cut_path_m(job: &Self::Job, run: &Self::Run) -> f64;
+
+    /// Runs other than the usual ones of a next measurement that tell causes apart: what they are, the condition that is another
+    /// one, its value, and the run.
+    fn telling_runs(job: &Self::Job, run: &Self::Run) -> Vec<TellingRun<Self::Run>>;
+
     /// What the drawing allows.
     fn limits(job: &Self::Job) -> Limits;
+
+    /// What of a run decides the path that the calculator gives for a job: without a path of its own, and without conditions
+    /// that no effect of the job goes with.
+    fn deciding(job: &Self::Job, run: &Self::Run) -> Self::Run;
+
+    /// A run on the path of another one; on the nominal one where that has none of its own.
+    fn on_path_of(run: &Self::Run, other: &Self::Run) -> Self::Run;
+
+    /// A run on the path that the calculator gives for a job under its conditions; `None` where it gives none.
+    fn compensated(job: &Self::Job, run: &Self::Run, monitor: &dyn Monitor) -> Result<Option<Self::Run>, Failure>;
+
+    /// The job under the conditions of a run, with these effects instead of its own. The path is its answer, so that of the run
+    /// is not looked at.
+    fn under(job: &Self::Job, run: &Self::Run, effects: Vec<Self::Effect>) -> Self::Job;
+
+    /// A place along the part, as a share of its length.
+    fn point_along(job: &Self::Job, share: f64) -> Self::Point;
+}
+
+/// A run that may tell causes apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TellingRun<R> {
+    /// What it is: `other_depth`, `air_cut`.
+    pub code: &'static str,
+    /// The condition that is another one, and its value.
+    pub condition: (&'static str, f64),
+    /// The run.
+    pub run: R,
 }
 
 /// What a drawing allows of the diameter along a part.

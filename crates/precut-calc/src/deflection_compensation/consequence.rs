@@ -61,7 +61,7 @@ pub(super) fn consequences(
 }
 
 /// The corners of the path driven with these effects beside the job's own; `None` where it is not complete.
-fn compensated(
+pub(super) fn compensated(
     job: &Job,
     conditions: &DeflectionRun,
     believed: &[DeflectionEffect],

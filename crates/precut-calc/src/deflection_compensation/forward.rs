@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
+    TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
@@ -15,15 +15,15 @@ use crate::shaft::places;
 use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange, error_um};
 use super::check::outside_shaft;
-use super::consequence::consequences;
+use super::consequence::{compensated, consequences};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design, remainder_name};
-use super::input::{FeedDirection, Job, Stations, Theory};
+use super::input::{Aim, FeedDirection, IncludeMode, Job, Stations, Theory, Tolerance};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, wanted};
 use super::next_runs::next_runs;
-use super::regime::{Regime, Step, passages, section_of_pass};
+use super::regime::{Regime, Step, cut_path_m, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
 const UM_PER_MM: f64 = 1e3;
@@ -456,9 +456,74 @@ impl Watched for DeflectionCompensation {
         run.tool_path_at_start_m
     }
 
+    fn at_path_m(run: &DeflectionRun, path_m: Option<f64>) -> DeflectionRun {
+        DeflectionRun { tool_path_at_start_m: path_m, ..run.clone() }
+    }
+
+    fn cut_path_m(job: &Job, run: &DeflectionRun) -> f64 {
+        let job = under(job, run);
+        cut_path_m(&job, &Regime::of(&job.cut))
+    }
+
+    fn telling_runs(job: &Job, run: &DeflectionRun) -> Vec<TellingRun<DeflectionRun>> {
+        let turned = job.shaft.segments.iter().map(|own| 0.5 * (own.stock_mm() - own.diameter_mm));
+        let depth_mm = run.depth_mm.unwrap_or_else(|| turned.fold(0.0, f64::max));
+        // On the nominal path: that of a part is made for its own depth.
+        let at = |code, share: f64| TellingRun {
+            code,
+            condition: ("depth_mm", share * depth_mm),
+            run: DeflectionRun { depth_mm: Some(share * depth_mm), commanded_path: Vec::new(), ..run.clone() },
+        };
+        if depth_mm > 0.0 {
+            vec![at("other_depth", 0.5), at("other_depth", 1.5), at("air_cut", 0.02)]
+        } else {
+            Vec::new()
+        }
+    }
+
     fn limits(job: &Job) -> Limits {
         let size = job.tolerance.size();
         Limits { form_um: job.tolerance.form_um, lower_um: size.lower_um, upper_um: size.upper_um }
+    }
+
+    fn deciding(job: &Job, run: &DeflectionRun) -> DeflectionRun {
+        // A formula may go with any of them.
+        let asks = |own: &DeflectionEffect, condition: &str| {
+            own.formula().is_some() || own.cause().conditions.contains(&condition)
+        };
+        let goes_with = |condition: &str| job.effects.iter().any(|own| asks(own, condition));
+        let kept = |name: &str, value: Option<f64>| value.filter(|_| goes_with(name));
+        DeflectionRun {
+            tool_path_at_start_m: kept("tool_path_at_start_m", run.tool_path_at_start_m),
+            warm_time_at_start_min: kept("warm_time_at_start_min", run.warm_time_at_start_min),
+            commanded_path: Vec::new(),
+            ..run.clone()
+        }
+    }
+
+    fn on_path_of(run: &DeflectionRun, other: &DeflectionRun) -> DeflectionRun {
+        DeflectionRun { commanded_path: other.commanded_path.clone(), ..run.clone() }
+    }
+
+    fn compensated(job: &Job, run: &DeflectionRun, monitor: &dyn Monitor) -> Result<Option<DeflectionRun>, Failure> {
+        let mut job = under(job, run);
+        if job.aim == (Aim::Nominal {}) {
+            // How sure it is to come out well moves no path.
+            job.tolerance = Tolerance::default();
+        }
+        let path = compensated(&job, run, &[], monitor)?;
+        Ok(path.map(|commanded_path| DeflectionRun { commanded_path, ..run.clone() }))
+    }
+
+    fn under(job: &Job, run: &DeflectionRun, effects: Vec<DeflectionEffect>) -> Job {
+        let mut job = under(job, run);
+        // The model that predicts takes the switches as they stand.
+        job.include.mode = IncludeMode::AsStated;
+        Job { effects, ..job }
+    }
+
+    fn point_along(job: &Job, share: f64) -> DeflectionPoint {
+        DeflectionPoint { z_mm: share * job.shaft.length_mm() }
     }
 }
 
@@ -483,10 +548,7 @@ impl PreparedRun {
         places.sort_by(|a, b| a.1.total_cmp(&b.1));
         let job = job_of_run(base, run, places.iter().map(|p| p.1).collect());
         let grid = Grid::of(&job);
-        let conditions = DeflectionConditions {
-            tool_path_at_start_m: run.tool_path_at_start_m.or(base.conditions.tool_path_at_start_m),
-            warm_time_at_start_min: run.warm_time_at_start_min.or(base.conditions.warm_time_at_start_min),
-        };
+        let conditions = conditions(base, run);
         let regime = Regime::of(&job.cut);
         let stock = super::stage::stock_radii_mm(&job, &grid);
         let target: Vec<f64> = grid.segment.iter().map(|&i| job.shaft.segments[i].diameter_mm / 2.0).collect();
@@ -584,11 +646,24 @@ impl PreparedRun {
     }
 }
 
+/// The state that effects depend on in a run.
+fn conditions(base: &Job, run: &DeflectionRun) -> DeflectionConditions {
+    DeflectionConditions {
+        tool_path_at_start_m: run.tool_path_at_start_m.or(base.conditions.tool_path_at_start_m),
+        warm_time_at_start_min: run.warm_time_at_start_min.or(base.conditions.warm_time_at_start_min),
+    }
+}
+
 /// The base job under the conditions of a run, at the places measured.
 fn job_of_run(base: &Job, run: &DeflectionRun, z_mm: Vec<f64>) -> Job {
+    Job { stations: Stations::List { z_mm }, ..under(base, run) }
+}
+
+/// The base job under the conditions of a run.
+fn under(base: &Job, run: &DeflectionRun) -> Job {
     let mut job = base.clone();
-    job.stations = Stations::List { z_mm };
     job.passes.clear();
+    job.conditions = conditions(base, run);
     if let Some(depth) = run.depth_mm {
         job.stock_profile = None;
         for segment in &mut job.shaft.segments {

@@ -185,6 +185,11 @@ pub(super) fn cutting_time_min(job: &Job, regime: &Regime, step: &Step) -> f64 {
     step.time_before_min + whole(job, &paces(job, regime, step)).0
 }
 
+/// Path that the edge cuts over all turned zones in a job of one cut, m.
+pub(super) fn cut_path_m(job: &Job, regime: &Regime) -> f64 {
+    whole(job, &paces(job, regime, &Step::default())).1
+}
+
 /// Section that bends in a pass: passes are computed with the finished section of the pass.
 pub(super) fn section_of_pass(job: &Job, uncut_side: bool) -> Section {
     if uncut_side {

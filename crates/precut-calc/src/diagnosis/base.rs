@@ -142,7 +142,8 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         self.predicted(&self.acting(believed)?)
     }
 
-    fn with_settings(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
+    /// The effects that act with these settings: those of the base, as far as they have not changed, and theirs.
+    pub(crate) fn with_settings(&self, settings: &[Setting]) -> Result<Vec<M::Effect>, Failure> {
         let changed = |effect: usize| {
             let is_of = |setting: &&Setting| {
                 self.hypotheses.applicable[setting.hypothesis].held.as_ref().is_some_and(|held| held.effect == effect)
@@ -241,7 +242,7 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
 }
 
 /// In place of an effect that is the same but for its numbers, or beside the others.
-fn put<M: Diagnosable>(effects: &mut Vec<M::Effect>, effect: M::Effect) {
+pub(crate) fn put<M: Diagnosable>(effects: &mut Vec<M::Effect>, effect: M::Effect) {
     effects.retain(|own| !M::is_same(own, &effect));
     effects.push(effect);
 }

@@ -68,6 +68,7 @@ mod view;
 mod weigh;
 mod whiten;
 
+pub(crate) use base::put;
 pub(crate) use basis::cosine;
 pub(crate) use calculator::layout;
 pub(crate) use copies::digits_written;

@@ -73,7 +73,7 @@ fn calls_person(
     let leader = change.and_then(|change| change.causes.first());
     let unnamed = change.filter(|change| change.verdict == ChangeVerdict::Unnamed && !change.accepted);
     let reported: Vec<u32> = memory.changes.iter().rev().take(2).map(|change| change.reported_at_part).collect();
-    let is_now = |reported: u32| part.number - reported < SOON;
+    let is_now = |reported: u32| part.number - reported <= SOON;
     if new_path.in_tolerance_probability.is_some_and(|probability| probability < LIKELY) {
         Some("process_out_of_tolerance_with_any_path")
     } else if unnamed.is_some() && limits.form_um.is_some_and(|form| forecast.as_now.form_um > LARGE * form) {

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::document::{Document, MOST_PARTS, Options, Part};
+use super::edges::completed;
 use crate::calculator::{Calculator, Check, Finding, Measurement, Violations, Watched};
 
 /// Rows of a part at most; of more, means per station are sent.
-const MOST_ROWS: usize = 400;
+pub(super) const MOST_ROWS: usize = 400;
 /// Types of parts at most.
 const MOST_TYPES: usize = 8;
 
@@ -18,8 +19,9 @@ pub const CODES: &[&str] = &[
     "number_taken",
     "unknown_quantity",
     "value_missing",
-    "part_condition_missing",
-    "part_contradicts",
+    "condition_missing",
+    "condition_contradicts",
+    "unit_suspected",
     "out_of_range",
 ];
 
@@ -36,7 +38,7 @@ pub fn faults<M: Watched>(
         of_part::<M>(document, part, &mut own);
         own.into_vec().into_iter().for_each(|fault| found.add(fault.under(&format!("/parts/{index}"))));
     }
-    between_parts::<M>(parts, &mut found);
+    between_parts::<M>(document, parts, &mut found);
     found.into_vec()
 }
 
@@ -129,8 +131,13 @@ fn of_part<M: Watched>(
     }
 }
 
-/// What parts say beside each other: numbers, conditions that all state or none, edges that only go on.
-fn between_parts<M: Watched>(parts: &[Part<M::Run, M::Row>], found: &mut Violations) {
+/// What parts say beside each other: numbers, conditions that all state or none, edges that only go on. Of an edge of which every
+/// part came its path is known.
+fn between_parts<M: Watched>(
+    document: &Document<<M as Calculator>::Input, M::Allowances>,
+    parts: &[Part<M::Run, M::Row>],
+    found: &mut Violations,
+) {
     let mut by_number: BTreeMap<u32, usize> = BTreeMap::new();
     for (index, part) in parts.iter().enumerate() {
         let first = *by_number.entry(part.number).or_insert(index);
@@ -140,38 +147,33 @@ fn between_parts<M: Watched>(parts: &[Part<M::Run, M::Row>], found: &mut Violati
                 .with("part", first)
         });
     }
+    let mut edge = None;
+    let completed: Vec<(usize, Part<M::Run, M::Row>)> =
+        by_number.into_values().map(|index| (index, completed::<M>(document, &parts[index], &mut edge))).collect();
     let mut stated: Vec<&'static str> = Vec::new();
-    for part in parts {
+    for (_, part) in &completed {
         let own = M::conditions(&part.conditions);
         stated.extend(own.into_iter().filter(|(_, value)| value.is_some()).map(|(name, _)| name));
     }
-    for (index, part) in parts.iter().enumerate() {
+    let mut before: Option<(u32, f64)> = None;
+    for (index, part) in &completed {
         for (name, value) in M::conditions(&part.conditions) {
+            let cause = M::CAUSES.iter().find(|cause| cause.conditions.contains(&name));
             found.require(value.is_some() || !stated.contains(&name), || {
-                Finding::new("part_condition_missing", format!("/parts/{index}/conditions/{name}"))
+                Finding::new("condition_missing", format!("/parts/{index}/conditions/{name}"))
+                    .with("kind", cause.map_or("", |cause| cause.kind))
                     .with("condition", name)
             });
         }
-    }
-    let mut before: Option<(u32, f64)> = None;
-    for &index in by_number.values() {
-        let part = &parts[index];
         let Some(edge) = part.edge else { continue };
         let path_m = M::path_m(&part.conditions).unwrap_or(0.0);
         if let Some((edge_before, path_before)) = before {
+            let contradicts = |field: &str| Finding::new("condition_contradicts", format!("/parts/{index}/{field}"));
             found.require(edge >= edge_before, || {
-                Finding::new("part_contradicts", format!("/parts/{index}/edge")).measured(
-                    f64::from(edge),
-                    f64::from(edge_before),
-                    "1",
-                )
+                contradicts("edge").measured(f64::from(edge), f64::from(edge_before), "1")
             });
             found.require(edge != edge_before || path_m >= path_before, || {
-                Finding::new("part_contradicts", format!("/parts/{index}/conditions/tool_path_at_start_m")).measured(
-                    path_m,
-                    path_before,
-                    "m",
-                )
+                contradicts("conditions/tool_path_at_start_m").measured(path_m, path_before, "m")
             });
         }
         before = Some((edge, path_m));

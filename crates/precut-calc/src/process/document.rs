@@ -124,6 +124,9 @@ pub struct Part<R, W> {
     /// Readings of a master with the gauge that measured the part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub gauge_checks: Vec<GaugeCheck>,
+    /// Whether a person looked at what seemed wrong with it: rows of an earlier part, a wrong unit.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub confirmed: bool,
     /// What was measured, all in one run.
     pub measurements: Vec<W>,
 }

@@ -16,6 +16,7 @@ const MOST_CAUSES: usize = 4;
 const MOST_TOLD: usize = 50;
 
 /// A change that was reported and is not yet part of the model.
+#[derive(Clone)]
 pub(super) struct Pending {
     pub(super) id: String,
     pub(super) reported: u32,
@@ -23,6 +24,7 @@ pub(super) struct Pending {
 }
 
 /// A change that is part of the model.
+#[derive(Clone)]
 pub(super) struct Accepted {
     pub(super) id: String,
     pub(super) since: u32,
@@ -128,6 +130,7 @@ impl Memory {
             joined: number,
             used_then: self.used,
         });
+        self.joined += 1;
         self.first = number + 1;
         self.scores.clear();
     }

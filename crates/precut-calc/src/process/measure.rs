@@ -1,11 +1,15 @@
 //! What to measure next, and what it would decide (`process/5`).
 
+use std::sync::Arc;
+
+use super::check::MOST_ROWS;
 use super::memory::Memory;
+use super::next::measured_over;
 use super::null::Gram;
-use super::sight::{COSINES, GAUGE, Sighting};
+use super::sight::{COSINES, GAUGE};
 use super::state::{ChangedCause, Measure};
 use super::watch::{PartOf, Watch};
-use crate::calculator::{Failure, Measurement, Monitor, Ranges, Rows, Watched};
+use crate::calculator::{Calculator, Failure, Measurement, Monitor, Ranges, Rows, Watched};
 
 /// Standard uncertainty of a reading of a master, where none was stated, um.
 const MASTER_UM: f64 = 0.5;
@@ -21,28 +25,46 @@ pub(super) fn ranked<M: Watched>(
     let Some([one, other]) = watch.memory.rivals() else { return Ok(Vec::new()) };
     let decides = [one.kind.clone(), other.kind.clone()];
     let mut found = Vec::new();
-    let mut add = |code, part_type, condition, squared: f64| {
-        let expected_bayes_factor = (0.5 * squared).exp().min(MOST);
-        found.push(Measure { code, part_type, condition, decides: decides.clone(), expected_bayes_factor });
+    let plain = |code, squared: f64| Measure {
+        code,
+        part_type: None,
+        condition: None,
+        value: None,
+        stations: None,
+        decides: decides.clone(),
+        expected_bayes_factor: (0.5 * squared).exp().min(MOST),
     };
     if let Some(gauge) = [&one, &other].into_iter().find(|cause| cause.kind == GAUGE) {
-        add("master_on_gauge", None, None, (2.0 * gauge.delta / MASTER_UM).powi(2));
+        found.push(plain("master_on_gauge", (2.0 * gauge.delta / MASTER_UM).powi(2)));
     }
     for (name, of_type) in watch.eye.document.part_types.keys().zip(0..) {
         let seen = watch.memory.parts.iter().rev().find(|(part, _)| part.kind == of_type && !part.odd);
         if let Some(gram) = seen.and_then(|(_, gram)| gram.as_ref()) {
             let is_last = *name == last.part_type;
             let code = if is_last { "another_part" } else { "other_part_type" };
-            add(code, (!is_last).then(|| name.clone()), None, watch.memory.apart(gram, &one, &other));
+            let measure = plain(code, watch.memory.apart(gram, &one, &other));
+            found.push(Measure { part_type: (!is_last).then(|| name.clone()), ..measure });
         }
     }
     let job = watch.eye.document.part_types[&last.part_type].job.clone();
+    if let Some((stations, gram)) = denser(watch, last, &job, monitor)? {
+        let measure = plain("more_stations", watch.memory.apart(&gram, &one, &other));
+        found.push(Measure { stations: Some(stations), ..measure });
+    }
     let points = last.measurements.iter().map(|row| (0, row.point())).collect();
     let rows = Rows { runs: vec![last.conditions.clone()], points };
-    for next in M::next_runs(&job, &rows, Ranges(&[])) {
-        let part = PartOf::<M> { conditions: next.run, ..last.clone() };
+    let usual = M::next_runs(&job, &rows, Ranges(&[])).into_iter().map(|next| {
+        // A fresh edge has cut nothing; all others are conditions as they are called.
+        let is_edge = M::path_m(&next.run) == Some(0.0) && M::path_m(&last.conditions) != Some(0.0);
+        (if is_edge { "new_edge" } else { "other_condition" }, next.changes, None, next.run)
+    });
+    let telling = M::telling_runs(&job, &last.conditions).into_iter();
+    let telling = telling.map(|own| (own.code, own.condition.0, Some(own.condition.1), own.run));
+    for (code, condition, value, run) in usual.chain(telling).collect::<Vec<_>>() {
+        let part = PartOf::<M> { conditions: run, ..last.clone() };
         let Some(gram) = gram_of(watch, &part, monitor)? else { continue };
-        add("other_condition", None, Some(next.changes), watch.memory.apart(&gram, &one, &other));
+        let measure = plain(code, watch.memory.apart(&gram, &one, &other));
+        found.push(Measure { condition: Some(condition), value, ..measure });
     }
     found.sort_by(|a, b| b.expected_bayes_factor.total_cmp(&a.expected_bayes_factor));
     // Of one condition the better end.
@@ -58,6 +80,27 @@ pub(super) fn ranked<M: Watched>(
     Ok(ranked)
 }
 
+/// How many stations between and beside those of the last part, and what they would tell.
+fn denser<M: Watched>(
+    watch: &Watch<M>,
+    last: &PartOf<M>,
+    job: &<M as Calculator>::Input,
+    monitor: &dyn Monitor,
+) -> Result<Option<(usize, Gram)>, Failure> {
+    let Some([from, to]) = measured_over::<M>(job, &last.measurements) else { return Ok(None) };
+    let count = (2 * last.measurements.len() - 1).min(MOST_ROWS);
+    if count <= last.measurements.len() {
+        return Ok(None);
+    }
+    let share = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
+    let points = (0..count).map(|k| M::point_along(job, share(k))).collect();
+    let mut catalogue = watch.memory.catalogue.clone();
+    let signs = watch.eye.signs_at(&last.part_type, &last.conditions, points, &mut catalogue, monitor)?;
+    let Some(scatter) = &watch.memory.scatter else { return Ok(None) };
+    let sighting = Arc::new(signs).unmeasured(last.number, watch.eye.kind(last)?);
+    Ok(Some((count, Gram::of(&sighting, scatter, &catalogue))))
+}
+
 /// What a part would tell that was cut otherwise; nothing where the model does not go there.
 fn gram_of<M: Watched>(watch: &mut Watch<M>, part: &PartOf<M>, monitor: &dyn Monitor) -> Result<Option<Gram>, Failure> {
     let mut catalogue = watch.memory.catalogue.clone();
@@ -67,11 +110,7 @@ fn gram_of<M: Watched>(watch: &mut Watch<M>, part: &PartOf<M>, monitor: &dyn Mon
         Err(_) => return Ok(None),
     };
     let Some(scatter) = &watch.memory.scatter else { return Ok(None) };
-    let rows = signs.base.len();
-    let (keep, kind) = (signs.predicted.clone(), watch.eye.kind(part)?);
-    let (value, residual) = (vec![0.0; rows], vec![0.0; rows]);
-    let (number, checks) = (part.number, Vec::new());
-    let sighting = Sighting { number, ordinal: 0, kind, signs, value, residual, keep, checks, odd: false };
+    let sighting = signs.unmeasured(part.number, watch.eye.kind(part)?);
     Ok(Some(Gram::of(&sighting, scatter, &catalogue)))
 }
 

@@ -24,6 +24,11 @@ const RARE: f64 = 0.001;
 const STIRS: f64 = -0.5;
 /// Rows that agree with those of an earlier part with less than this probability were copied.
 const BY_CHANCE: f64 = 1e-9;
+/// Rows that lie so far from what was expected of them are no chance, and no cause of the catalogue makes another unit of them.
+const NEVER: f64 = 1e-9;
+/// Factors that a wrong unit, a wrong sign, or a radius for a diameter leaves, and how near the fitted one has to be.
+const UNITS: [f64; 7] = [1000.0, 1e-3, 25.4, 1.0 / 25.4, 2.0, 0.5, -1.0];
+const NEAR: f64 = 0.12;
 /// Parts over which the scatter is watched.
 const SCORES: usize = 20;
 /// Scatter is learned anew after so many parts.
@@ -32,6 +37,7 @@ const LEARN_AFTER: [usize; 3] = [40, 80, 160];
 const MOST_CHANGES: usize = 6;
 
 /// All that is remembered of the parts.
+#[derive(Clone)]
 pub(super) struct Memory {
     pub(super) options: Options,
     pub(super) noise: Option<f64>,
@@ -49,6 +55,8 @@ pub(super) struct Memory {
     pub(super) first: u32,
     pub(super) pending: Option<Pending>,
     pub(super) accepted: Vec<Accepted>,
+    /// How many changes ever joined the model.
+    pub(super) joined: usize,
     pub(super) reported: usize,
     pub(super) changes: Vec<Change>,
     pub(super) odd: Vec<OddPart>,
@@ -75,6 +83,7 @@ impl Memory {
             first: 0,
             pending: None,
             accepted: Vec::new(),
+            joined: 0,
             reported: 0,
             changes: Vec::new(),
             odd: Vec::new(),
@@ -85,9 +94,6 @@ impl Memory {
 
     pub(super) fn take(&mut self, mut part: Sighting, monitor: &dyn Monitor) -> Result<State, Failure> {
         let number = part.number;
-        if self.is_copy(&part) {
-            return Ok(self.unused(number, Unused::CopiedRows));
-        }
         self.free_up(&part);
         let odd_rows = self.odd_rows(&part, monitor)?;
         if odd_rows.len() as f64 > MOST_ODD * part.value.len() as f64 {
@@ -121,13 +127,50 @@ impl Memory {
     }
 
     /// Whether an earlier part has the same rows to the last digit, and scatter would not let that happen.
-    fn is_copy(&self, part: &Sighting) -> bool {
+    pub(super) fn is_copy(&self, part: &Sighting) -> bool {
         let Some(scatter) = &self.scatter else { return false };
         // Two normal numbers fall on the same digit d with d/(2 sigma sqrt(pi)).
         let width = 2.0 * scatter.sigma * std::f64::consts::PI.sqrt();
         let chance: f64 = digits_written(&part.value).iter().map(|digit| (digit / width).min(1.0)).product();
         let is_same = |before: &Sighting| before.kind == part.kind && before.value == part.value;
         chance < BY_CHANCE && self.parts.iter().any(|(before, _)| is_same(before))
+    }
+
+    /// The factor that a wrong unit leaves, and the one fitted, where the rows lie far from what was expected and, divided by either,
+    /// do not.
+    pub(super) fn unit_suspected(&self, part: &Sighting) -> Option<[f64; 2]> {
+        let scatter = self.scatter.as_ref()?;
+        // Causes that no part has shown yet are in no column of what is known.
+        if part.signs.causes.iter().any(|(variant, _)| !self.knows(*variant)) {
+            return None;
+        }
+        let chance = |factor: f64| {
+            let residual = part.value.iter().zip(&part.signs.base).map(|(y, f)| y / factor - f).collect();
+            let divided = Sighting { residual, checks: Vec::new(), ..part.clone() };
+            let gram = Gram::of(&divided, scatter, &self.catalogue);
+            let told = Told::of(&divided, &gram, &self.columns);
+            let (chi2, _) = self.with_null(|_, null| null.distance(&told)).flatten()?;
+            ChiSquared::new(gram.rows as f64).ok().map(|law| law.sf(chi2))
+        };
+        // Of parts that are expected to be straight every change, divided by enough, is as expected.
+        if chance(1.0)? > NEVER || chance(f64::INFINITY)? > NEVER {
+            return None;
+        }
+        let expected = self.expected_rows(part)?;
+        let (along, square) =
+            part.value.iter().zip(&expected).fold((0.0, 0.0), |sum, (y, f)| (sum.0 + y * f, sum.1 + f * f));
+        let fitted = along / square;
+        let fits = |factor: f64| {
+            let is_near = (fitted / factor - 1.0).abs() < NEAR;
+            let tried = if is_near { [factor, fitted] } else { [factor; 2] };
+            tried.into_iter().filter_map(chance).any(|p| p > RARE)
+        };
+        UNITS.into_iter().find(|factor| fits(*factor)).map(|factor| [factor, fitted])
+    }
+
+    /// Whether all parts in memory were looked at for a variant.
+    fn knows(&self, variant: usize) -> bool {
+        self.parts.iter().all(|(_, gram)| gram.as_ref().is_none_or(|gram| COSINES + variant < gram.residual()))
     }
 
     /// Columns of what shows for the first time.
@@ -187,20 +230,22 @@ impl Memory {
     /// Rows that stand alone beside what was expected of the part.
     fn odd_rows(&self, part: &Sighting, monitor: &dyn Monitor) -> Result<Vec<usize>, Failure> {
         let Some(scatter) = &self.scatter else { return Ok(Vec::new()) };
-        let Some(expected) = self.with_null(|_, null| {
-            let mean = null.mean();
-            let mut expected = vec![0.0; part.value.len()];
-            for (size, column) in mean.iter().zip(null.rows_of(part)) {
-                expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
-            }
-            expected
-        }) else {
-            return Ok(Vec::new());
-        };
-        let left: Vec<f64> = part.residual.iter().zip(expected).map(|(r, e)| r - e).collect();
+        let Some(expected) = self.expected_rows(part) else { return Ok(Vec::new()) };
+        let left: Vec<f64> = part.value.iter().zip(expected).map(|(y, e)| y - e).collect();
         let mut rows = outliers(&part.data(), &left, Some(scatter.sigma), monitor)?.rows;
         rows.sort_unstable();
         Ok(rows)
+    }
+
+    /// The rows of a part as the parts before let expect them.
+    fn expected_rows(&self, part: &Sighting) -> Option<Vec<f64>> {
+        self.with_null(|_, null| {
+            let mut expected = part.signs.base.clone();
+            for (size, column) in null.mean().iter().zip(null.rows_of(part)) {
+                expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
+            }
+            expected
+        })
     }
 
     /// Parts that are too old live on in what is known of what is free.

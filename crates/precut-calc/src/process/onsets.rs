@@ -110,6 +110,7 @@ impl Scale<'_> {
                 let prior = weight * share * own / scales.len() as f64;
                 for &scale in scales {
                     let fit = sums.one(COSINES + variant, form, scale, &halved, null);
+                    let fit = fit.within(scale, self.catalogue.variants[variant].reach());
                     let (what, log_weight) = (What::Cause(variant), prior.ln() + fit.log_bf);
                     let Fit { mean, variance, .. } = fit;
                     hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
@@ -144,7 +145,9 @@ impl Scale<'_> {
         let mut all = Vec::new();
         for (variant, own) in shares.iter().enumerate() {
             let prior = 0.5 * own / SCALES.len() as f64;
-            let fits = SCALES.map(|scale| sums.one(COSINES + variant, Form::Step, scale, &halved, null).log_bf);
+            let reach = self.catalogue.variants[variant].reach();
+            let fit = |scale| sums.one(COSINES + variant, Form::Step, scale, &halved, null).within(scale, reach);
+            let fits = SCALES.map(|scale| fit(scale).log_bf);
             all.extend(fits.map(|log_bf| prior.ln() + log_bf));
         }
         for size in 0..SIZES.len() {

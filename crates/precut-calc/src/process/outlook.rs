@@ -5,11 +5,12 @@ use nalgebra::{DMatrix, DVector};
 use super::action;
 use super::measure;
 use super::memory::Memory;
-use super::null::{Null, Source, Told};
+use super::null::{Column, Null, Source, Told};
 use super::onsets::{Entry, What};
+use super::report;
 use super::sight::{COSINES, Sighting};
-use super::state::{Forecast, Outlook, PathForecast};
-use super::watch::Watch;
+use super::state::{Forecast, Model, Outlook, PathForecast};
+use super::watch::{PartOf, Watch};
 use crate::calculator::{Failure, Limits, Monitor, Watched};
 use crate::diagnosis::log_sum_exp;
 use crate::num::stats::Resampler;
@@ -38,29 +39,118 @@ struct Drawn {
     directions: DMatrix<f64>,
 }
 
+/// The next part as it may be cut: of which type, under which conditions, on which path.
+pub(super) struct Coming<M: Watched> {
+    pub(super) part: PartOf<M>,
+    pub(super) sighting: Sighting,
+}
+
 impl<M: Watched> Watch<M> {
     /// The next part, of the type and under the conditions of the last, and what to do; nothing while the process is learned.
     pub fn outlook(&mut self, monitor: &dyn Monitor) -> Result<Option<Outlook>, Failure> {
         let Some(last) = self.last.clone() else { return Ok(None) };
-        let limits = M::limits(&self.eye.document.part_types[&last.part_type].job);
-        let memory = &self.memory;
-        let Some((part, _)) = memory.parts.back() else { return Ok(None) };
-        let Some(expected) = memory.with_null(|told, null| memory.expected(part, told, null)) else { return Ok(None) };
-        let scatter = memory.scattered(part);
-        let per_um = part.signs.per_um;
-        let forecast = Forecast {
-            as_now: expected.forecast(&DVector::zeros(expected.mean.len()), &scatter, per_um, limits),
-            new_path: expected.forecast(&expected.mean, &scatter, per_um, limits),
+        self.outlook_of(&last.part_type, &last.conditions, monitor)
+    }
+
+    /// The next part where it is of this type, under these conditions and on their path; nothing while the process is learned, or
+    /// where no part of that type came.
+    pub fn outlook_of(
+        &mut self,
+        part_type: &str,
+        conditions: &M::Run,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Outlook>, Failure> {
+        let Some(Coming { part, sighting }) = self.coming(part_type, conditions, monitor)? else { return Ok(None) };
+        let limits = M::limits(&self.eye.document.part_types[part_type].job);
+        let on_base = match self.account.on_base(sighting.kind, conditions, monitor)? {
+            Some(run) if run != *conditions => self.coming(part_type, &run, monitor)?,
+            _ => None,
         };
-        let action = action::of(memory, part, &expected, &scatter, &forecast, limits);
-        let measure_next = measure::ranked(self, &last, monitor)?;
-        Ok(Some(Outlook { forecast, action, measure_next }))
+        let memory = &self.memory;
+        let expected = |next: &Sighting| memory.with_null(|told, null| memory.expected(next, told, null));
+        let Some(own) = expected(&sighting) else { return Ok(None) };
+        let scatter = memory.scattered(&sighting);
+        let per_um = sighting.signs.per_um;
+        let as_is = DVector::zeros(own.mean.len());
+        let as_now = own.forecast(&as_is, &scatter, per_um, limits);
+        let base_path = match on_base.and_then(|on_base| Some((expected(&on_base.sighting)?, on_base))) {
+            Some((base, on_base)) => base.forecast(&as_is, &memory.scattered(&on_base.sighting), per_um, limits),
+            None => as_now.clone(),
+        };
+        let new_path = own.forecast(&own.mean, &scatter, per_um, limits);
+        let forecast = Forecast { as_now, new_path, base_path };
+        let action = action::of(memory, &sighting, &own, &scatter, &forecast, limits);
+        let model = memory.model(&sighting);
+        let measure_next = measure::ranked(self, &part, monitor)?;
+        let (gain, _) = self.gain(monitor)?;
+        Ok(Some(Outlook { model, forecast, action, measure_next, gain }))
+    }
+
+    /// The next part with the rows of the last one of its type; nothing where none came.
+    pub(super) fn coming(
+        &mut self,
+        part_type: &str,
+        conditions: &M::Run,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Coming<M>>, Failure> {
+        let Some(number) = self.memory.parts.back().map(|(part, _)| part.number + 1) else { return Ok(None) };
+        let Some(kind) = self.eye.document.part_types.keys().position(|name| name == part_type) else {
+            return Ok(None);
+        };
+        let Some(template) = self.account.last_of(kind) else { return Ok(None) };
+        let part = PartOf::<M> { number, conditions: conditions.clone(), ..template.clone() };
+        // Other conditions may show causes that no part has shown; nothing is known of them.
+        let mut catalogue = self.memory.catalogue.clone();
+        let sighting = self.eye.signs(&part, &mut catalogue, monitor)?.unmeasured(number, kind);
+        Ok(Some(Coming { part, sighting }))
     }
 }
 
 impl Memory {
+    /// What the process is taken to be: the changes that joined its model, and what no cause explains of the next part.
+    fn model(&self, part: &Sighting) -> Model {
+        let rows = part.value.len();
+        let none = Model {
+            revision: self.joined + 1,
+            sizes: Vec::new(),
+            covariance: Vec::new(),
+            remainder: vec![0.0; rows],
+            remainder_deviation: vec![0.0; rows],
+        };
+        self.with_null(|_, null| {
+            let is_profile = |column: &Column| !matches!(column.source, Source::Cause(_));
+            let named: Vec<usize> = (0..null.columns.len()).filter(|&k| !is_profile(&null.columns[k])).collect();
+            let inverse = null.factor.inverse();
+            let mean = null.mean();
+            let unit = |k: usize| match null.columns[k].source {
+                Source::Cause(variant) => self.catalogue.variants[variant].prior_sd * null.columns[k].sd,
+                _ => null.columns[k].sd,
+            };
+            let size =
+                |k: usize| report::model_size(&self.catalogue, &null.columns[k], mean[k], inverse[(k, k)].sqrt());
+            let covariance =
+                named.iter().map(|&i| named.iter().map(|&j| inverse[(i, j)] * unit(i) * unit(j)).collect());
+            let of_rows = null.rows_of(part);
+            let profile: Vec<usize> = (0..null.columns.len()).filter(|&k| is_profile(&null.columns[k])).collect();
+            let at = |row: usize| profile.iter().map(|&k| of_rows[k][row] * mean[k]).sum();
+            let spread = |row: usize| {
+                let along = |k: usize| of_rows[k][row];
+                let square = |i: usize| profile.iter().map(|&j| along(i) * inverse[(i, j)] * along(j)).sum::<f64>();
+                profile.iter().map(|&i| square(i)).sum::<f64>().max(0.0).sqrt()
+            };
+            Model {
+                sizes: named.iter().filter_map(|&k| size(k)).collect(),
+                covariance: covariance.collect(),
+                remainder: (0..rows).map(at).collect(),
+                remainder_deviation: (0..rows).map(spread).collect(),
+                ..none.clone()
+            }
+        })
+        .unwrap_or(none)
+    }
+
     /// What parts scatter by themselves, one standard deviation a column, at the rows of a part.
-    fn scattered(&self, part: &Sighting) -> DMatrix<f64> {
+    pub(super) fn scattered(&self, part: &Sighting) -> DMatrix<f64> {
         let factors = self.scatter.as_ref().map_or(&[][..], |scatter| &scatter.factors);
         let columns = part.signs.scatter.iter().zip(factors);
         let columns: Vec<DVector<f64>> =
@@ -68,13 +158,13 @@ impl Memory {
         if columns.is_empty() { DMatrix::zeros(part.value.len(), 0) } else { DMatrix::from_columns(&columns) }
     }
 
-    fn expected(&self, part: &Sighting, told: &[Told<'_>], null: &Null) -> Expected {
-        let (rows, number) = (part.value.len(), part.number + 1);
+    /// What the mean deviation of a part that did not come yet may be.
+    pub(super) fn expected(&self, part: &Sighting, told: &[Told<'_>], null: &Null) -> Expected {
+        let (rows, number) = (part.value.len(), part.number);
         // The gauge moves readings, not parts.
         let is_of_gauge = |source: Source| self.catalogue.gauge().is_some_and(|own| source == Source::Cause(own));
-        let next = Sighting { number, ..part.clone() };
         let of_rows: Vec<DVector<f64>> = null
-            .rows_of(&next)
+            .rows_of(part)
             .into_iter()
             .zip(&null.columns)
             .map(|(column, own)| if is_of_gauge(own.source) { vec![0.0; rows] } else { column })

@@ -1,10 +1,10 @@
 //! Changes and states in the words of the contract (`process/4`).
 
 use super::document::Options;
-use super::null::Form;
+use super::null::{Column, Form, Source};
 use super::onsets::What;
 use super::sight::Catalogue;
-use super::state::{Change, ChangeForm, ChangeVerdict, ChangedCause, Situation, State, Unused};
+use super::state::{Change, ChangeForm, ChangeVerdict, ChangedCause, ModelSize, Situation, State, Unused};
 use super::verdict::{Class, Judgement, NORMAL_95, Suspect};
 use crate::calculator::Message;
 
@@ -19,6 +19,7 @@ pub const EXPLANATION_CODES: &[&str] = &[
     "process_odd_part",
     "process_too_few_rows",
     "process_copied_rows",
+    "process_unit_suspected",
     "process_measure_again",
 ];
 
@@ -55,16 +56,38 @@ fn cause(suspect: &Suspect, catalogue: &Catalogue) -> ChangedCause {
         kind: name.map_or("unnamed", |name| name.kind).to_owned(),
         label: name.map_or_else(String::new, |name| name.label.clone()),
         share: suspect.share,
-        form: match suspect.form {
-            Form::Step => ChangeForm::Step,
-            Form::Drift => ChangeForm::Drift,
-        },
+        form: form_of(suspect.form),
         parameter,
         unit,
         delta: at(0.0),
         interval_95: [at(-NORMAL_95).max(least), at(NORMAL_95)],
         at_bound: !(lower..=upper).contains(&at(0.0)),
         same_as_other: suspect.same_as_other,
+    }
+}
+
+/// A size of the model, of a free column at so many of its standard deviations; nothing of what is no cause.
+pub(super) fn model_size(catalogue: &Catalogue, column: &Column, mean: f64, deviation: f64) -> Option<ModelSize> {
+    let Source::Cause(variant) = column.source else { return None };
+    let own = &catalogue.variants[variant];
+    let name = &catalogue.names[own.name];
+    let at = |deviations: f64| (mean + deviations * deviation) * column.sd * own.prior_sd;
+    Some(ModelSize {
+        kind: name.kind.to_owned(),
+        label: name.label.clone(),
+        since_part: column.since.map(|(since, _)| since),
+        form: column.since.map(|(_, form)| form_of(form)),
+        parameter: own.parameter,
+        unit: own.unit,
+        delta: at(0.0),
+        interval_95: [at(-NORMAL_95), at(NORMAL_95)],
+    })
+}
+
+fn form_of(form: Form) -> ChangeForm {
+    match form {
+        Form::Step => ChangeForm::Step,
+        Form::Drift => ChangeForm::Drift,
     }
 }
 
@@ -76,6 +99,7 @@ pub(super) fn explanation(state: &State, options: &Options) -> Vec<Message> {
         let code = match unused {
             Unused::TooFewRows => "process_too_few_rows",
             Unused::CopiedRows => "process_copied_rows",
+            Unused::UnitSuspected => "process_unit_suspected",
             Unused::MeasureAgain => "process_measure_again",
         };
         said.push(Message::new(code).with("part", number));

@@ -42,6 +42,17 @@ pub(super) struct Variant {
     pub(super) in_null: bool,
 }
 
+impl Variant {
+    /// Least and largest change, in prior standard deviations. Of what is free although nothing changed nobody knows from where
+    /// it changes: it has no bounds.
+    pub(super) fn reach(&self) -> [f64; 2] {
+        if self.in_null {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        self.range.map(|end| end / self.prior_sd)
+    }
+}
+
 /// All causes that the parts so far can speak of.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Catalogue {
@@ -117,6 +128,16 @@ impl<M: Watched> Eye<M> {
         Self { document, seen }
     }
 
+    pub(super) fn copy(&self) -> Self {
+        let copied = |before: &Before<M>| Before {
+            run: before.run.clone(),
+            rows: before.rows.clone(),
+            signs: Arc::clone(&before.signs),
+        };
+        let seen = self.seen.iter().map(|before| before.as_ref().map(copied)).collect();
+        Self { document: self.document.clone(), seen }
+    }
+
     /// Number of a type in the order of the names.
     pub(super) fn kind(&self, part: &Part<M::Run, M::Row>) -> Result<usize, Failure> {
         let known = self.document.part_types.keys().position(|name| *name == part.part_type);
@@ -155,16 +176,44 @@ impl<M: Watched> Eye<M> {
         part: &Part<M::Run, M::Row>,
         monitor: &'m dyn Monitor,
     ) -> Result<(Bound<'m, M>, Layout), Failure> {
-        let job = &self.document.part_types[&part.part_type].job;
+        let points = used(part).into_iter().map(|row| part.measurements[row].point()).collect();
+        let bound = self.bound_at(&part.part_type, &part.conditions, points, monitor)?;
+        let layout = layout(&part.measurements, &used(part), M::design(bound.prepared()));
+        Ok((bound, layout))
+    }
+
+    /// The model bound to places on a part.
+    pub(super) fn bound_at<'m>(
+        &self,
+        part_type: &str,
+        run: &M::Run,
+        points: Vec<M::Point>,
+        monitor: &'m dyn Monitor,
+    ) -> Result<Bound<'m, M>, Failure> {
+        let job = &self.document.part_types[part_type].job;
         let quantity = &self.document.quantity;
-        let points = used(part).into_iter().map(|row| (0, part.measurements[row].point())).collect();
-        let rows = Rows { runs: vec![part.conditions.clone()], points };
+        let rows = Rows { runs: vec![run.clone()], points: points.into_iter().map(|point| (0, point)).collect() };
         let prepared = M::prepare(&M::without_effects(job), &rows, quantity, monitor).map_err(unprepared)?;
-        let layout = layout(&part.measurements, &used(part), M::design(&prepared));
         let known = Known { effects: M::own_effects(job).to_vec(), unsure: Vec::new() };
         let options = DiagnosisOptions::default();
         let allowances = self.document.allowances.clone();
-        Ok((Bound::new(prepared, known, allowances, quantity, &options, monitor)?, layout))
+        Bound::new(prepared, known, allowances, quantity, &options, monitor)
+    }
+
+    /// What a part would show at places along it, all in one sweep.
+    pub(super) fn signs_at(
+        &self,
+        part_type: &str,
+        run: &M::Run,
+        points: Vec<M::Point>,
+        catalogue: &mut Catalogue,
+        monitor: &dyn Monitor,
+    ) -> Result<Signs, Failure> {
+        let rows = points.len();
+        let bound = self.bound_at(part_type, run, points, monitor)?;
+        let design = M::design(bound.prepared());
+        let layout = Layout { traces: vec![(0..rows).collect()], run_of_trace: vec![0], design };
+        self.signs_of(part_type, &bound, layout, catalogue, monitor)
     }
 
     fn looked_at(
@@ -174,10 +223,21 @@ impl<M: Watched> Eye<M> {
         monitor: &dyn Monitor,
     ) -> Result<Signs, Failure> {
         let (bound, layout) = self.bound(part, monitor)?;
+        self.signs_of(&part.part_type, &bound, layout, catalogue, monitor)
+    }
+
+    fn signs_of(
+        &self,
+        part_type: &str,
+        bound: &Bound<'_, M>,
+        layout: Layout,
+        catalogue: &mut Catalogue,
+        monitor: &dyn Monitor,
+    ) -> Result<Signs, Failure> {
         let predictions = bound.predict(&[])?;
         let predicted: Vec<bool> = predictions.iter().map(Result::is_ok).collect();
         let base: Vec<f64> = predictions.into_iter().map(|f| f.unwrap_or(0.0)).collect();
-        let signatures = Signatures::of(&bound, &base, &vec![0.0; base.len()], monitor)?;
+        let signatures = Signatures::of(bound, &base, &vec![0.0; base.len()], monitor)?;
         let mut causes = Vec::new();
         for (hypothesis, variants) in bound.hypotheses().iter().zip(&signatures.variants) {
             for variant in variants {
@@ -205,7 +265,7 @@ impl<M: Watched> Eye<M> {
             return Err(Failure::Internal("a watched part whose rows do not stand along it".to_owned()));
         };
         let cosines = (0..COSINES).map(|k| along.iter().map(|&u| cosine(k, u)).collect()).collect();
-        let own = M::own_effects(&self.document.part_types[&part.part_type].job);
+        let own = M::own_effects(&self.document.part_types[part_type].job);
         let scatter = M::scatter(bound.prepared(), own, &self.document.allowances, monitor)?;
         Ok(Signs { base, predicted, layout, cosines, causes, scatter, per_um })
     }
@@ -248,6 +308,24 @@ fn unprepared(error: PrepareError) -> Failure {
             .into_iter()
             .next()
             .map_or_else(|| Failure::Internal("rows without a reason".to_owned()), Failure::OutOfModel),
+    }
+}
+
+impl Signs {
+    /// A part of which nothing was measured.
+    pub(super) fn unmeasured(self: Arc<Self>, number: u32, kind: usize) -> Sighting {
+        let rows = self.base.len();
+        Sighting {
+            number,
+            ordinal: 0,
+            kind,
+            value: vec![0.0; rows],
+            residual: vec![0.0; rows],
+            keep: self.predicted.clone(),
+            signs: self,
+            checks: Vec::new(),
+            odd: false,
+        }
     }
 }
 

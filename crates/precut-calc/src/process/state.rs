@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::account::Gain;
 use crate::calculator::Message;
 
 /// How the process stands.
@@ -26,6 +27,8 @@ pub enum Unused {
     TooFewRows,
     /// The rows are those of an earlier part to the last digit.
     CopiedRows,
+    /// The rows are those before times a factor, as a wrong unit leaves.
+    UnitSuspected,
     /// Too many rows stand alone.
     MeasureAgain,
 }
@@ -170,12 +173,55 @@ pub struct OddPart {
 /// What the next part will be like, and what to do.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outlook {
+    /// What the process is taken to be.
+    pub model: Model,
     /// The next part with the path as it was, and with a new one.
     pub forecast: Forecast,
     /// What to do.
     pub action: Action,
     /// What to measure, the best first.
     pub measure_next: Vec<Measure>,
+    /// What paths brought so far.
+    pub gain: Gain,
+}
+
+/// The base job's model with what the parts tell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Model {
+    /// 1 and one more with each change that joined it.
+    pub revision: usize,
+    /// Sizes of the causes that act beside the base job's effects: those that come and go with conditions, and those that changed.
+    pub sizes: Vec<ModelSize>,
+    /// Their covariance, in the units of the sizes.
+    pub covariance: Vec<Vec<f64>>,
+    /// What no cause explains, at the rows of the next part, in the unit of the quantity.
+    pub remainder: Vec<f64>,
+    /// Its standard deviation.
+    pub remainder_deviation: Vec<f64>,
+}
+
+/// A size of the model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModelSize {
+    /// The kind of its cause in the catalogue.
+    pub kind: String,
+    /// Which of several of one kind.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub label: String,
+    /// Since when it acts; absent where it always did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since_part: Option<u32>,
+    /// How it goes on from there; of a drift the size is that after 20 parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<ChangeForm>,
+    /// The field of the effect.
+    pub parameter: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// By how much it differs from the base job's.
+    pub delta: f64,
+    /// The same with 95 %.
+    pub interval_95: [f64; 2],
 }
 
 /// The next part.
@@ -185,6 +231,8 @@ pub struct Forecast {
     pub as_now: PathForecast,
     /// With the mean deviation taken out.
     pub new_path: PathForecast,
+    /// With the path that the base job alone gives; as now where it gives none.
+    pub base_path: PathForecast,
 }
 
 /// A part that is cut on one path.
@@ -244,6 +292,12 @@ pub struct Measure {
     /// The condition to change, where one is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub condition: Option<&'static str>,
+    /// Its value, in the unit of the condition's field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// How many stations along the part, where more than now.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stations: Option<usize>,
     /// Which two causes it tells apart.
     pub decides: [String; 2],
     /// By how much: expected Bayes factor of one such part or reading.

@@ -1,6 +1,7 @@
 //! Running sums over parts from an onset on, and the evidence that they hold (`process/3.2`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::function::erf::erfc;
 
 use super::null::{DRIFT_PARTS, Form, Null, Told};
 use super::sight::COSINES;
@@ -25,6 +26,53 @@ pub(super) struct Fit {
     /// Size in prior standard deviations at scale 1: its posterior mean.
     pub(super) mean: f64,
     pub(super) variance: f64,
+}
+
+/// Beyond so many standard deviations a bound is no bound.
+const FAR: f64 = 6.0;
+
+impl Fit {
+    /// The same where the size cannot leave a range: both densities are cut off there. `scale` is the standard deviation of the
+    /// prior.
+    pub(super) fn within(self, scale: f64, [least, most]: [f64; 2]) -> Self {
+        if least < -FAR * scale && most > FAR * scale {
+            return self;
+        }
+        let deviation = self.variance.sqrt();
+        let [a, b] = [least, most].map(|end| (end - self.mean) / deviation);
+        let (own, before) = (normal_between(a, b), normal_between(least / scale, most / scale));
+        // So far outside that only the bound is left.
+        if own < f64::MIN_POSITIVE {
+            let log_bf = self.log_bf - 0.5 * a.max(-b).powi(2) - before.ln();
+            return Self { log_bf, mean: self.mean.clamp(least, most), variance: 0.0 };
+        }
+        let density =
+            |x: f64| if x.is_finite() { (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt() } else { 0.0 };
+        let times = |x: f64| if x.is_finite() { x * density(x) } else { 0.0 };
+        let shift = (density(a) - density(b)) / own;
+        let spread = 1.0 + (times(a) - times(b)) / own - shift * shift;
+        Self {
+            log_bf: self.log_bf + own.ln() - before.ln(),
+            mean: (self.mean + deviation * shift).clamp(least, most),
+            variance: self.variance * spread.max(0.0),
+        }
+    }
+}
+
+/// Probability of a standard normal number between two ends.
+fn normal_between(a: f64, b: f64) -> f64 {
+    // On the side where it loses no digits.
+    if a > 0.0 { upper_tail(a) - upper_tail(b) } else { upper_tail(-b) - upper_tail(-a) }
+}
+
+fn upper_tail(x: f64) -> f64 {
+    if x == f64::INFINITY {
+        0.0
+    } else if x == f64::NEG_INFINITY {
+        1.0
+    } else {
+        0.5 * erfc(x / std::f64::consts::SQRT_2)
+    }
 }
 
 impl Sums {
@@ -191,6 +239,35 @@ mod tests {
             };
             DVector::from_vec(self.parts.iter().flat_map(of).collect())
         }
+    }
+
+    #[test]
+    fn a_size_with_bounds_has_the_evidence_of_a_cut_off_prior() {
+        // BF(theta) = exp(theta b - theta^2 g/2) over a normal prior, cut off: by the rectangle rule.
+        let (scale, g, b) = (0.7, 3.0, -2.5);
+        let spread = 1.0 + scale * scale * g;
+        let whole = Fit {
+            log_bf: -0.5 * f64::ln(spread) + 0.5 * scale * scale * b * b / spread,
+            mean: scale * scale * b / spread,
+            variance: scale * scale / spread,
+        };
+        for [least, most] in [[0.0, 2.0], [-0.3, 0.4], [-9.0, 0.1]] {
+            let (mut prior, mut sums) = (0.0, [0.0; 3]);
+            let steps = 400_000;
+            for k in 0..steps {
+                let theta: f64 = least + (most - least) * (f64::from(k) + 0.5) / f64::from(steps);
+                let density = (-0.5 * (theta / scale).powi(2)).exp();
+                let own = density * (theta * b - 0.5 * theta * theta * g).exp();
+                prior += density;
+                sums.iter_mut().zip([1.0, theta, theta * theta]).for_each(|(sum, power)| *sum += own * power);
+            }
+            let mean = sums[1] / sums[0];
+            let fit = whole.within(scale, [least, most]);
+            assert!((fit.log_bf - f64::ln(sums[0] / prior)).abs() < 1e-6, "{fit:?}");
+            assert!((fit.mean - mean).abs() < 1e-6 && (fit.variance - (sums[2] / sums[0] - mean * mean)).abs() < 1e-6);
+        }
+        assert_eq!(whole.within(scale, [-9.0, 9.0]), whole);
+        assert_eq!(whole.within(scale, [900.0, 901.0]).mean, 900.0);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! A process, part by part.
 
+use super::account::Account;
 use super::document::{Document, Part};
+use super::edges::{self, Edge};
 use super::memory::Memory;
 use super::sight::{Eye, Sighting, used};
 use super::state::{State, Unused};
-use crate::calculator::{Calculator, Diagnosable, Failure, ForwardModel, Monitor, Watched};
+use crate::calculator::{Calculator, Diagnosable, Failure, Finding, ForwardModel, Monitor, Watched};
 
 /// A part with fewer rows says too little.
 const LEAST_ROWS: usize = 4;
@@ -19,6 +21,8 @@ pub struct Watch<M: Watched> {
     pub(super) eye: Eye<M>,
     pub(super) memory: Memory,
     pub(super) last: Option<PartOf<M>>,
+    pub(super) account: Account<M>,
+    edge: Option<Edge>,
 }
 
 impl<M: Watched> Watch<M> {
@@ -26,7 +30,8 @@ impl<M: Watched> Watch<M> {
     pub fn new(document: DocumentOf<M>) -> Self {
         let noise = document.noise_um.map(|um| um * M::per_diameter_um(&document.quantity));
         let memory = Memory::new(document.options.clone(), noise);
-        Self { eye: Eye::new(document), memory, last: None }
+        let account = Account::new(&document);
+        Self { eye: Eye::new(document), memory, last: None, account, edge: None }
     }
 
     /// All parts, in whatever order they stand: the state after each, by ascending number.
@@ -49,17 +54,59 @@ impl<M: Watched> Watch<M> {
         }
         let ordinal = self.memory.came;
         self.memory.came += 1;
+        let part = &edges::completed::<M>(&self.eye.document, part, &mut self.edge);
         if used(part).len() < LEAST_ROWS {
             return Ok(self.memory.unused(part.number, Unused::TooFewRows));
         }
+        let sighting = self.seen(part, ordinal, monitor)?;
+        if !part.confirmed {
+            if self.memory.is_copy(&sighting) {
+                return Ok(self.memory.unused(part.number, Unused::CopiedRows));
+            }
+            if self.memory.unit_suspected(&sighting).is_some() {
+                return Ok(self.memory.unused(part.number, Unused::UnitSuspected));
+            }
+        }
+        self.last = Some(part.clone());
+        let state = self.memory.take(sighting, monitor)?;
+        self.book(part, &state, monitor)?;
+        Ok(state)
+    }
+
+    /// What is to be said before a part is taken: that its rows are those before times a factor, as a wrong unit leaves.
+    pub fn doubts(&mut self, part: &PartOf<M>, monitor: &dyn Monitor) -> Result<Vec<Finding>, Failure> {
+        let mut edge = self.edge;
+        let part = &edges::completed::<M>(&self.eye.document, part, &mut edge);
+        if part.confirmed || used(part).len() < LEAST_ROWS {
+            return Ok(Vec::new());
+        }
+        let sighting = self.seen(part, self.memory.came, monitor)?;
+        let suspected = self.memory.unit_suspected(&sighting);
+        let finding = suspected.map(|[factor, fitted]| {
+            Finding::new("unit_suspected", "/measurements").with("factor", factor).with("fitted", fitted)
+        });
+        Ok(finding.into_iter().collect())
+    }
+
+    fn seen(&mut self, part: &PartOf<M>, ordinal: usize, monitor: &dyn Monitor) -> Result<Sighting, Failure> {
         let signs = self.eye.signs(part, &mut self.memory.catalogue, monitor)?;
         let (kind, value) = (self.eye.kind(part)?, self.eye.values(part));
         let residual = value.iter().zip(&signs.base).zip(&signs.predicted);
         let residual = residual.map(|((y, f), predicted)| if *predicted { y - f } else { 0.0 }).collect();
         let (keep, checks, number) = (signs.predicted.clone(), part.gauge_checks.clone(), part.number);
-        let sighting = Sighting { number, ordinal, kind, signs, value, residual, keep, checks, odd: false };
-        self.last = Some(part.clone());
-        self.memory.take(sighting, monitor)
+        Ok(Sighting { number, ordinal, kind, signs, value, residual, keep, checks, odd: false })
+    }
+
+    /// The same once more: what comes to one of them does not come to the other.
+    #[must_use]
+    pub fn copy(&self) -> Self {
+        Self {
+            eye: self.eye.copy(),
+            memory: self.memory.clone(),
+            last: self.last.clone(),
+            account: self.account.copy(),
+            edge: self.edge,
+        }
     }
 
     /// How many parts and how many onsets are in memory, and how many columns are free: bounded, however many parts came.

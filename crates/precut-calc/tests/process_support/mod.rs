@@ -1,10 +1,15 @@
 //! Streams of parts with a known truth.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use precut_calc::calculator::Calculator;
-use precut_calc::deflection_compensation::DeflectionCompensation;
-use precut_calc::process::{DocumentOf, PartOf};
+pub(crate) mod series;
+
+use precut_calc::calculator::{Calculator, ForwardModel, Rows, Unwatched};
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionPoint, DeflectionRun, Job};
+use precut_calc::effects::DeflectionEffect;
+use precut_calc::num::stats::Resampler;
+use precut_calc::process::{DocumentOf, PartOf, State, Watch};
 use serde_json::{Value, json};
+use std::ops::RangeInclusive;
 
 pub(crate) type Document = DocumentOf<DeflectionCompensation>;
 pub(crate) type Part = PartOf<DeflectionCompensation>;
@@ -50,4 +55,66 @@ pub(crate) fn process(stream: &Value) -> (Document, Vec<Part>) {
         .unwrap()
     });
     (document, parts.collect())
+}
+
+pub(crate) fn replay(document: &Document, parts: &[Part]) -> (Watch<DeflectionCompensation>, Vec<State>) {
+    Watch::replay(document.clone(), parts, &Unwatched).unwrap()
+}
+
+/// Parts of one process with its own scatter and nothing else; `acting` tells what acts beside the job in a part.
+pub(crate) struct Shop {
+    pub(crate) document: Document,
+    pub(crate) random: Resampler,
+    pub(crate) template: Part,
+}
+
+impl Shop {
+    pub(crate) fn new(seed: u64) -> Self {
+        let (mut document, parts) = process(&stream("r10-nothing-300.json"));
+        document.options.false_alarm_every_parts = 500;
+        Self { document, random: Resampler::new(seed, 3), template: parts[0].clone() }
+    }
+
+    pub(crate) fn parts(&mut self, count: u32, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
+        self.cut(1..=count, acting)
+    }
+
+    pub(crate) fn cut(
+        &mut self,
+        numbers: RangeInclusive<u32>,
+        acting: impl Fn(u32) -> Vec<DeflectionEffect>,
+    ) -> Vec<Part> {
+        let job = &self.document.part_types["A"].job;
+        let points = self.template.measurements.iter().map(|row| (0, DeflectionPoint { z_mm: row.z_mm })).collect();
+        let rows = Rows { runs: vec![self.template.conditions.clone()], points };
+        let prepared = DeflectionCompensation::prepare(job, &rows, &self.document.quantity, &Unwatched).unwrap();
+        let mut part = |number: u32| {
+            let setup_um = self.random.normal();
+            let mut acting = acting(number);
+            acting.push(DeflectionEffect::ForceLevel { delta: 0.007 * self.random.normal() });
+            let predicted = DeflectionCompensation::predict(&prepared, &acting, &Unwatched).unwrap();
+            let mut part = Part { number, ..self.template.clone() };
+            for (row, um) in part.measurements.iter_mut().zip(predicted) {
+                row.diameter_deviation_um = Some(um.unwrap() + setup_um + self.random.normal());
+            }
+            part
+        };
+        numbers.map(&mut part).collect()
+    }
+}
+
+/// The run on the path that the calculator gives for a job.
+pub(crate) fn on_path(job: &Job, run: &DeflectionRun) -> DeflectionRun {
+    let path = DeflectionCompensation::run(job, &Unwatched).unwrap().output.path.unwrap();
+    assert!(path.complete);
+    let zones = path.zones.iter();
+    let points = zones.flat_map(|zone| zone.z_mm.iter().zip(&zone.commanded_diameter_mm));
+    let points: Vec<Value> = points.map(|(z, d)| json!({ "z_mm": z, "diameter_mm": d })).collect();
+    DeflectionRun { commanded_path: serde_json::from_value(json!(points)).unwrap(), ..run.clone() }
+}
+
+/// A number of draws: few, or as many as the environment asks for.
+pub(crate) fn draws(variable: &str, few: u64) -> (u64, bool) {
+    let wanted = std::env::var(variable).ok().and_then(|count| count.parse().ok());
+    (wanted.unwrap_or(few), wanted.is_some())
 }
