@@ -25,6 +25,9 @@ pub trait Watched: Diagnosable {
 
     /// What the drawing allows.
     fn limits(job: &Self::Job) -> Limits;
+
+    /// The path that an answer commands, as a run that was cut on it states it; nothing where the answer has no whole path.
+    fn commanded(output: &Self::Output) -> Option<Self::Run>;
 }
 
 /// What a drawing allows of the diameter along a part.

@@ -32,6 +32,7 @@ const LEARN_AFTER: [usize; 3] = [40, 80, 160];
 const MOST_CHANGES: usize = 6;
 
 /// All that is remembered of the parts.
+#[derive(Clone)]
 pub(super) struct Memory {
     pub(super) options: Options,
     pub(super) noise: Option<f64>,

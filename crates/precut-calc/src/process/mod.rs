@@ -12,7 +12,7 @@
 //! - `detector`: when to say that something changed; parts that are odd by themselves (`process/3.3`);
 //! - `verdict`: which cause, since when, how large (`process/3.5`);
 //! - `outlook`, `action`, `measure`: the next part (`process/4`, `process/5`);
-//! - `memory`, `follow`: what is remembered of the parts, and of a change from its alarm on;
+//! - `memory`, `follow`, `decide`: what is remembered of the parts, of a change from its alarm on, and what a person says of it;
 //! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
 //!
 //! The state is a function of the document and of the parts in the order of their numbers, and of nothing else. It holds no
@@ -20,6 +20,7 @@
 
 mod action;
 mod check;
+mod decide;
 mod detector;
 mod document;
 mod follow;
@@ -38,6 +39,7 @@ mod watch;
 
 pub use action::ACTION_CODES;
 pub use check::{CODES as FAULT_CODES, faults};
+pub use decide::Decision;
 pub use document::{Document, GaugeCheck, MOST_PARTS, Options, Part, PartType, Threshold};
 pub use report::EXPLANATION_CODES;
 pub use state::*;

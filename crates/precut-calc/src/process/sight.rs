@@ -117,6 +117,16 @@ impl<M: Watched> Eye<M> {
         Self { document, seen }
     }
 
+    pub(super) fn copy(&self) -> Self {
+        let copied = |before: &Before<M>| Before {
+            run: before.run.clone(),
+            rows: before.rows.clone(),
+            signs: Arc::clone(&before.signs),
+        };
+        let seen = self.seen.iter().map(|before| before.as_ref().map(copied)).collect();
+        Self { document: self.document.clone(), seen }
+    }
+
     /// Number of a type in the order of the names.
     pub(super) fn kind(&self, part: &Part<M::Run, M::Row>) -> Result<usize, Failure> {
         let known = self.document.part_types.keys().position(|name| *name == part.part_type);
