@@ -292,8 +292,8 @@ impl Default for ApiKey {
 }
 
 /// What may be done with a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum Scope {
     /// Ask: send jobs and cancel them.
     Solve,
@@ -303,23 +303,61 @@ pub enum Scope {
     Models,
     /// Store and delete machines, tools and materials of one's own.
     Library,
+    /// Declare, feed, decide on and delete processes of one's own.
+    Processes,
+    /// Report parts of processes of one's own: of all, or of the one of that name.
+    Parts(Option<String>),
     /// See and cancel the jobs and read the results of all owners, and read the metrics.
     Admin,
+}
+
+impl TryFrom<String> for Scope {
+    type Error = String;
+    fn try_from(word: String) -> Result<Self, String> {
+        Ok(match word.as_str() {
+            "solve" => Self::Solve,
+            "read" => Self::Read,
+            "models" => Self::Models,
+            "library" => Self::Library,
+            "processes" => Self::Processes,
+            "parts" => Self::Parts(None),
+            "admin" => Self::Admin,
+            _ => match word.split_once(':') {
+                Some(("parts", process)) if !process.is_empty() => Self::Parts(Some(process.to_owned())),
+                _ => {
+                    return Err(format!(
+                        "{word} is no scope; they are solve, read, models, library, processes, parts, parts:PROCESS, admin"
+                    ));
+                }
+            },
+        })
+    }
+}
+
+impl From<Scope> for String {
+    fn from(scope: Scope) -> Self {
+        match &scope {
+            Scope::Parts(Some(process)) => format!("parts:{process}"),
+            other => other.word().to_owned(),
+        }
+    }
 }
 
 impl Scope {
     /// What a key may that says nothing of it.
     pub fn usual() -> Vec<Self> {
-        vec![Self::Solve, Self::Read, Self::Models, Self::Library]
+        vec![Self::Solve, Self::Read, Self::Models, Self::Library, Self::Processes]
     }
 
     /// As it is written.
-    pub const fn word(self) -> &'static str {
+    pub const fn word(&self) -> &'static str {
         match self {
             Self::Solve => "solve",
             Self::Read => "read",
             Self::Models => "models",
             Self::Library => "library",
+            Self::Processes => "processes",
+            Self::Parts(_) => "parts",
             Self::Admin => "admin",
         }
     }

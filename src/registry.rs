@@ -39,7 +39,7 @@ pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
 pub(crate) use shape::Shape;
-pub(crate) use watched::{NotReplayed, Replayed};
+pub(crate) use watched::{NotReplayed, Observed, Replayed, Watching};
 pub(crate) use way::{forms, way};
 
 use std::collections::BTreeMap;
@@ -49,8 +49,19 @@ use precut_calc::calculator::{Calculator, Diagnosable, ForwardModel, Registrar, 
 use utoipa::openapi::{RefOr, Schema};
 
 /// Names under `/v1/` that the service itself uses: no calculator may have one of them.
-pub const RESERVED: [&str; 10] =
-    ["jobs", "results", "studies", "models", "machines", "tools", "materials", "parts", "library", "calculators"];
+pub const RESERVED: [&str; 11] = [
+    "jobs",
+    "results",
+    "studies",
+    "models",
+    "machines",
+    "tools",
+    "materials",
+    "parts",
+    "library",
+    "processes",
+    "calculators",
+];
 
 /// Every calculator, in the order in which they are offered. Cheap to clone.
 #[derive(Clone)]

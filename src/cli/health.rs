@@ -40,7 +40,7 @@ fn own_url() -> String {
 }
 
 /// `host:port` and the path before `/health/ready`.
-fn parts(url: &str) -> Option<(&str, &str)> {
+pub(super) fn parts(url: &str) -> Option<(&str, &str)> {
     let rest = url.strip_prefix("http://")?;
     let (authority, path) = rest.find('/').map_or((rest, ""), |slash| rest.split_at(slash));
     let is_clean = |text: &str| !text.contains(|character: char| character.is_whitespace() || character.is_control());

@@ -242,7 +242,7 @@ const NO_JOB_FILE: &str = "this is no job file: that is {\"calculator\": \"NAME\
                            {\"study\": {...}}; if it is the bare job of a calculator, say which: --calculator NAME \
                            (`precut list` tells them)";
 
-fn no_json(error: &serde_json::Error) -> Failed {
+pub(super) fn no_json(error: &serde_json::Error) -> Failed {
     let message = error.to_string();
     let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(message, _)| message).to_owned();
     let (line, column) = (error.line(), error.column());

@@ -1,5 +1,6 @@
 //! The command line: the service, and the same calculators without it.
 
+mod ask;
 mod backup;
 mod compensate;
 mod health;
@@ -40,6 +41,8 @@ Examples:
   precut tools --search DNMG                      which tools are known
   precut solve job.json --library ours.toml       with machines and tools of one's own
   precut process replay parts.json                what would have been said after each measured part
+  precut process new shaft-560.json --url http://127.0.0.1:8080
+                                                  a process that the service keeps; then `add` for each measured part
   precut check job.json                           every fault of a job at once
   precut compensate shaft.nc --job shaft.json -o shaft.c.nc
                                                   a program corrected, the diff on standard output
@@ -205,6 +208,13 @@ enum Failed {
     Usage(String),
     /// The machine, in words.
     Machine(String),
+    /// A service does not take what is asked of it.
+    Refused {
+        /// Its problem document.
+        text: String,
+        /// Whether the fault is the service's.
+        is_ours: bool,
+    },
     /// The reader of our output has gone: nobody is left to tell.
     NobodyListens,
 }
@@ -266,6 +276,10 @@ pub fn main_as(
         Err(Failed::Machine(message)) => {
             let _ = writeln!(io::stderr(), "precut: {message}");
             ExitCode::FAILURE
+        }
+        Err(Failed::Refused { text, is_ours }) => {
+            let _ = writeln!(io::stderr(), "{text}");
+            ExitCode::from(if is_ours { 1 } else { 2 })
         }
         Err(Failed::Problem(problem)) => {
             let document = problem.document(language, None);

@@ -21,6 +21,7 @@ mod memory;
 mod model;
 mod models;
 mod names;
+mod process;
 mod progress;
 mod quota;
 mod read;
@@ -49,6 +50,8 @@ pub use library::{
 pub use model::ModelContent;
 pub use models::{ModelAnswer, ModelError, ModelFile, ModelSource, Shelf, StoredModel};
 pub use names::{Given, Library, NotGiven};
+pub(crate) use process::in_language;
+pub use process::{KeptProcess, NextAsked, NextPart, PartAnswer, PartOutcome, Precondition, ProcessError, WhichPath};
 pub use progress::Interim;
 pub use quota::{Share, Standing};
 pub use settings::EngineSettings;
@@ -67,6 +70,7 @@ use tokio::runtime::Handle;
 use crate::registry::{Entry, Registry};
 use crate::store::documents::DocumentStore;
 use crate::store::jobs::JobStore;
+use crate::store::processes::ProcessStore;
 use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
@@ -100,6 +104,8 @@ pub(crate) struct Inner {
     cores: Cores,
     store: Arc<dyn ResultStore>,
     documents: Arc<dyn DocumentStore>,
+    processes: Arc<dyn ProcessStore>,
+    live_processes: process::Processes,
     /// Counts changes of documents.
     generation: Arc<Generation>,
     /// Records and indices that were looked up lately.
@@ -128,14 +134,14 @@ impl Engine {
     pub async fn open(registry: Registry, settings: EngineSettings) -> Result<Self, OpenError> {
         let store = crate::store::open(&settings.store_settings()).await?;
         let (results, documents) = (Arc::<dyn Store>::clone(&store), Arc::<dyn Store>::clone(&store));
-        Self::with_stores(registry, settings, results, documents, store).await
+        let processes = Arc::<dyn Store>::clone(&store);
+        Self::with_stores(registry, settings, (results, documents, processes), store).await
     }
 
     async fn with_stores(
         registry: Registry,
         settings: EngineSettings,
-        store: Arc<dyn ResultStore>,
-        documents: Arc<dyn DocumentStore>,
+        (store, documents, processes): (Arc<dyn ResultStore>, Arc<dyn DocumentStore>, Arc<dyn ProcessStore>),
         jobs: Arc<dyn JobStore>,
     ) -> Result<Self, OpenError> {
         let cores = Cores::new(settings.cores, settings.job_slots, settings.patience)
@@ -155,6 +161,8 @@ impl Engine {
             cores,
             store,
             documents,
+            processes,
+            live_processes: process::Processes::default(),
             generation: Arc::default(),
             remembered: Remembered::default(),
             jobs,

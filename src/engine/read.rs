@@ -376,6 +376,11 @@ fn check_schema(entry: &Entry, job: &mut Value, (parts, room): (&[TablePart], &R
     if total == 0 { Ok(()) } else { Err(Found { findings, total, unread: tables.into_unread() }) }
 }
 
+/// Holds something to its schema, its tables read.
+pub(crate) fn check_body(entry: &Entry, body: &mut Value, tables: (&[TablePart], &Room)) -> Result<(), Error> {
+    check_schema(entry, body, tables).map_err(Found::told)
+}
+
 /// What the schema alone finds wrong with a job.
 pub(crate) fn schema_faults(entry: &Entry, mut job: Value) -> Vec<Finding> {
     check_schema(entry, &mut job, (&[], &Room::default())).err().map(|found| found.findings).unwrap_or_default()

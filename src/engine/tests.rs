@@ -390,7 +390,9 @@ async fn a_store_that_fails_fails_no_answer() {
     let keep = Keep { bytes: 1, age: settings.store_age, jobs: settings.job_age };
     let jobs = Arc::new(SqliteStore::open(folder.path(), keep).await.unwrap());
     let engine =
-        Engine::with_stores(toy::registry(), settings, Arc::new(BrokenStore), jobs.clone(), jobs).await.unwrap();
+        Engine::with_stores(toy::registry(), settings, (Arc::new(BrokenStore), jobs.clone(), jobs.clone()), jobs)
+            .await
+            .unwrap();
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());

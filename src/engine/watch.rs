@@ -16,20 +16,27 @@ pub(crate) fn replay(registry: &Registry, bytes: &[u8], monitor: &dyn Monitor) -
         return Err(invalid(vec![Finding::new("process_without_calculator", "/calculator")]));
     };
     let entry = super::entry(registry, &calculator)?;
-    let Some(replay) = entry.replay() else {
-        let known: Vec<&str> =
-            registry.entries().iter().filter(|own| own.replay().is_some()).map(|own| own.meta().id).collect();
-        let finding =
-            Finding::new("calculator_not_watched", "/calculator").with("name", calculator).with("known", known);
-        return Err(invalid(vec![finding]));
-    };
+    let Some(observed) = entry.observed() else { return Err(invalid(vec![not_watched(registry, &calculator)])) };
     fill_jobs(registry, &calculator, &mut process)?;
     let parts = process.get_mut("parts").and_then(Value::as_array_mut);
     parts.into_iter().flatten().for_each(lift);
-    replay(process, monitor).map_err(|error| match error {
-        NotReplayed::Faults(findings) => invalid(findings),
-        NotReplayed::Failed(failure) => Error::Calculation(failure),
-    })
+    (observed.replay)(process, monitor).map_err(Error::from)
+}
+
+impl From<NotReplayed> for Error {
+    fn from(error: NotReplayed) -> Self {
+        match error {
+            NotReplayed::Faults(findings) => invalid(findings),
+            NotReplayed::Failed(failure) => Self::Calculation(failure),
+        }
+    }
+}
+
+/// Nobody watches processes of that calculator.
+pub(super) fn not_watched(registry: &Registry, calculator: &str) -> Finding {
+    let watched = registry.entries().iter().filter(|own| own.observed().is_some());
+    let known: Vec<&str> = watched.map(|own| own.meta().id).collect();
+    Finding::new("calculator_not_watched", "/calculator").with("name", calculator.to_owned()).with("known", known)
 }
 
 /// Every default of the jobs of all types, or all faults of all of them.
@@ -51,7 +58,7 @@ fn fill_jobs(registry: &Registry, calculator: &str, process: &mut Value) -> Resu
 }
 
 /// What is the part's own stands beside its conditions.
-fn lift(part: &mut Value) {
+pub(super) fn lift(part: &mut Value) {
     for field in OF_PART {
         let own = part.get_mut("conditions").and_then(Value::as_object_mut).and_then(|fields| fields.remove(field));
         if let (Some(own), Some(fields)) = (own, part.as_object_mut()) {
@@ -60,7 +67,7 @@ fn lift(part: &mut Value) {
     }
 }
 
-fn invalid(mut findings: Vec<Finding>) -> Error {
+pub(super) fn invalid(mut findings: Vec<Finding>) -> Error {
     let total = findings.len();
     findings.sort_by(|a, b| a.pointer.cmp(&b.pointer));
     findings.truncate(Error::MOST_FAULTS);

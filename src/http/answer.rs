@@ -204,7 +204,7 @@ pub fn written(stored: &Stored, media: Media, part: Option<&str>, language: Lang
     rendered(stored, &View { media, part: part.map(ToOwned::to_owned), include: None, language })
 }
 
-fn not_acceptable(offered: &[Media]) -> Problem {
+pub(super) fn not_acceptable(offered: &[Media]) -> Problem {
     let available: Vec<_> = offered.iter().map(|media| media.essence()).collect();
     Problem::new(StatusCode::NOT_ACCEPTABLE, "not_acceptable").with("available", available.join(", "))
 }
@@ -256,7 +256,7 @@ fn absent<'a>(code: &'static str, view: &View, ids: impl Iterator<Item = &'a str
     Problem::missing(code, view.part.as_deref().unwrap_or_default()).with("available", available.join(", "))
 }
 
-fn drawn(figure: &Figure, language: Language) -> String {
+pub(super) fn drawn(figure: &Figure, language: Language) -> String {
     with_words(figure, language, |wording| render::svg(figure, wording))
 }
 

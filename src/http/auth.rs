@@ -82,10 +82,14 @@ fn known(auth: &config::Auth) -> Vec<Known> {
 
 impl Caller {
     /// Whether something may be done.
-    pub(super) fn may(&self, scope: Scope) -> bool {
+    pub(super) fn may(&self, scope: &Scope) -> bool {
         match self {
             Self::Anyone => true,
-            Self::Holder(holder) => holder.scopes.contains(&scope) || holder.scopes.contains(&Scope::Admin),
+            Self::Holder(holder) => holder.scopes.iter().any(|own| match (own, scope) {
+                // Who writes processes reports their parts, too.
+                (Scope::Admin, _) | (Scope::Processes | Scope::Parts(None), Scope::Parts(_)) => true,
+                _ => own == scope,
+            }),
             Self::Stranger => false,
         }
     }
@@ -100,7 +104,7 @@ impl Caller {
 
     /// Whose things are shown; those of all where it is none.
     pub(super) fn shown(&self) -> Option<String> {
-        self.owner().filter(|_| !self.may(Scope::Admin))
+        self.owner().filter(|_| !self.may(&Scope::Admin))
     }
 
     /// Whether a thing of that owner is shown.
@@ -127,10 +131,19 @@ pub(super) fn needed(method: &Method, path: &str) -> Scope {
         "/metrics" => Scope::Admin,
         _ if is_reading => Scope::Read,
         _ if path.starts_with("/v1/models") => Scope::Models,
+        _ if path.starts_with("/v1/processes") => of_process(method, path),
         // Nothing is stored.
         "/v1/tools/parse" => Scope::Solve,
         _ if RECORDS.iter().any(|folder| path.starts_with(folder)) => Scope::Library,
         _ => Scope::Solve,
+    }
+}
+
+/// What writing to a process takes: a gauge station reports parts and nothing else.
+fn of_process(method: &Method, path: &str) -> Scope {
+    match path.split('/').collect::<Vec<_>>()[..] {
+        ["", "v1", "processes", name, "parts", _] if *method == Method::PUT => Scope::Parts(Some(name.to_owned())),
+        _ => Scope::Processes,
     }
 }
 

@@ -12,7 +12,7 @@ use axum::http::header::{CACHE_CONTROL, HeaderValue};
 use axum::http::{HeaderMap, HeaderName, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
-use futures_util::stream;
+use futures_util::{Stream, stream};
 use precut_calc::calculator::Figure;
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -60,7 +60,7 @@ pub(super) struct Streams {
 }
 
 /// The right to one stream.
-struct Place {
+pub(super) struct Place {
     streams: Arc<Streams>,
     client: u64,
 }
@@ -70,7 +70,12 @@ impl Streams {
         Self { most, hasher: RandomState::new(), open: Mutex::default() }
     }
 
-    fn place(self: &Arc<Self>, client: impl Hash) -> Option<Place> {
+    /// So many a client may have open.
+    pub(super) fn most(&self) -> usize {
+        self.most
+    }
+
+    pub(super) fn place(self: &Arc<Self>, client: impl Hash) -> Option<Place> {
         let client = self.hasher.hash_one(client);
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         let count = open.entry(client).or_insert(0);
@@ -132,13 +137,18 @@ pub(super) async fn follow(
         let event = follower.next().await?;
         Some((Ok::<_, Infallible>(event), follower))
     });
+    Ok(streamed(events))
+}
+
+/// Events as they come.
+pub(super) fn streamed(events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static) -> Response {
     let mut response = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response();
     response.headers_mut().insert(CACHE_CONTROL, HeaderValue::from_static("no-store"));
     response.headers_mut().insert(X_ACCEL_BUFFERING, HeaderValue::from_static("no"));
-    Ok(response)
+    response
 }
 
-fn last_seen(headers: &HeaderMap) -> u64 {
+pub(super) fn last_seen(headers: &HeaderMap) -> u64 {
     headers.get(LAST_EVENT_ID).and_then(|id| id.to_str().ok()).and_then(|id| id.trim().parse().ok()).unwrap_or(0)
 }
 

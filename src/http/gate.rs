@@ -27,7 +27,7 @@ use tracing::Instrument;
 
 use super::auth::Caller;
 use super::problem::Problem;
-use super::{App, CACHE_STATE, Peer, auth, negotiate};
+use super::{App, CACHE_STATE, Peer, auth, negotiate, processes};
 use crate::text::Language;
 use crate::trace::{self, TraceContext};
 
@@ -127,7 +127,7 @@ fn admit(app: &App, request: &Request, caller: &Caller) -> Result<(), Problem> {
                 .header(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"precut\"")));
         }
         let scope = auth::needed(request.method(), path);
-        if !caller.may(scope) {
+        if !caller.may(&scope) {
             return Err(Problem::new(StatusCode::FORBIDDEN, "forbidden").with("scope", scope.word()));
         }
     }
@@ -233,6 +233,7 @@ fn allowed(app: &App, path: &str) -> &'static str {
         "jobs" if !name.contains('/') => "GET, HEAD, DELETE",
         "library" if name == "import" => "POST",
         "tools" if name == "parse" => "POST",
+        "processes" => processes::allowed(name),
         "models" | "machines" | "tools" | "materials" | "parts" if !name.contains('/') => "GET, HEAD, PUT, DELETE",
         _ => "GET, HEAD",
     }

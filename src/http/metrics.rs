@@ -27,6 +27,11 @@ const JOB_INPUT: &str = "/v1/jobs/{id}/job";
 const JOB_EVENTS: &str = "/v1/jobs/{id}/events";
 const MODEL: &str = "/v1/models/{name}";
 const MODEL_COMPARISON: &str = "/v1/models/{name}/comparison";
+const PROCESS: &str = "/v1/processes/{name}";
+const PROCESS_PARTS: &str = "/v1/processes/{name}/parts";
+const PROCESS_PART: &str = "/v1/processes/{name}/parts/{part}";
+const PROCESS_CHANGE: &str = "/v1/processes/{name}/changes/{id}";
+const PROCESS_MORE: &str = "/v1/processes/{name}/{what}";
 const RECORD: &str = "/v1/{kind}/{name}";
 const RECORD_COMPARISON: &str = "/v1/{kind}/{name}/comparison";
 const RESULT: &str = "/v1/results/{key}";
@@ -37,13 +42,18 @@ const RESULT_JOB_AT: &str = "/v1/results/{key}/job_at";
 const RESULT_PROVENANCE: &str = "/v1/results/{key}/provenance";
 
 /// Addresses with a variable part, as they are counted.
-const PATTERNS: [(&str, &str); 23] = [
+const PATTERNS: [(&str, &str); 28] = [
     ("/v1/jobs/", JOB),
     ("/v1/jobs/", JOB_RESULT),
     ("/v1/jobs/", JOB_INPUT),
     ("/v1/jobs/", JOB_EVENTS),
     ("/v1/models/", MODEL),
     ("/v1/models/", MODEL_COMPARISON),
+    ("/v1/processes/", PROCESS),
+    ("/v1/processes/", PROCESS_PARTS),
+    ("/v1/processes/", PROCESS_PART),
+    ("/v1/processes/", PROCESS_CHANGE),
+    ("/v1/processes/", PROCESS_MORE),
     ("/v1/results/", RESULT),
     ("/v1/results/", RESULT_FIGURES),
     ("/v1/results/", RESULT_TABLES),
@@ -64,7 +74,7 @@ const PATTERNS: [(&str, &str); 23] = [
 ];
 
 /// Addresses without one, besides the calculators'.
-const PLAIN: [&str; 18] = [
+const PLAIN: [&str; 19] = [
     "/",
     "/docs",
     "/openapi.json",
@@ -73,6 +83,7 @@ const PLAIN: [&str; 18] = [
     "/metrics",
     "/v1/calculators",
     "/v1/jobs",
+    "/v1/processes",
     "/v1/models",
     "/v1/results",
     "/v1/machines",
@@ -168,6 +179,15 @@ fn pattern(path: &str) -> Option<&'static str> {
     }
     if path.starts_with("/v1/models/") {
         return Some(if path.ends_with("/comparison") { MODEL_COMPARISON } else { MODEL });
+    }
+    if let Some(rest) = path.strip_prefix("/v1/processes/") {
+        return Some(match rest.split('/').collect::<Vec<_>>()[..] {
+            [_] => PROCESS,
+            [_, "parts"] => PROCESS_PARTS,
+            [_, "parts", _] => PROCESS_PART,
+            [_, "changes", _] => PROCESS_CHANGE,
+            _ => PROCESS_MORE,
+        });
     }
     let is_record = ["/v1/machines/", "/v1/tools/", "/v1/materials/"].iter().any(|folder| path.starts_with(folder));
     if is_record && path != "/v1/tools/parse" {

@@ -21,6 +21,7 @@ mod pages;
 mod parts;
 mod prefer;
 mod problem;
+mod processes;
 mod provenance;
 mod query;
 mod quota;
@@ -195,6 +196,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
         .route("/v1/library/import", post(library::import))
         .route("/v1/tools/parse", post(library::parse))
         .route("/v1/{calculator}", any(unknown_calculator));
+    router = router.merge(processes::routes());
     for kind in Kind::ALL {
         router = router.merge(records::routes(kind));
     }
@@ -231,6 +233,7 @@ fn cors(origins: &[String]) -> Option<CorsLayer> {
         header::ACCEPT_LANGUAGE,
         header::AUTHORIZATION,
         header::CONTENT_TYPE,
+        header::IF_MATCH,
         header::IF_NONE_MATCH,
         events::LAST_EVENT_ID,
         prefer::IDEMPOTENCY_KEY,

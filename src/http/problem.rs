@@ -211,6 +211,14 @@ impl Problem {
             .findings(findings, total)
     }
 
+    /// A process or a part of it that breaks rules.
+    pub(super) fn invalid_process(findings: Vec<Finding>, total: usize) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid_process")
+            .with("errors_total", total)
+            .with("listed", findings.len())
+            .findings(findings, total)
+    }
+
     /// Status of the answer.
     pub fn status(&self) -> StatusCode {
         self.0.status

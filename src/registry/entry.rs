@@ -22,7 +22,7 @@ use super::contract::{self, Contract, Make};
 use super::place::{TablePlace, table_places};
 use super::schema::Components;
 use super::shape::Shape;
-use super::watched::{self, Replay};
+use super::watched::Observed;
 use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
 use super::{family, names};
 
@@ -44,7 +44,7 @@ pub struct Entry {
     composed: bool,
     model_use: ModelUse,
     /// Of a calculator whose process can be watched.
-    replay: Option<Replay>,
+    observed: Option<Observed>,
     /// Bytes of the answer written last.
     answer_bytes: AtomicUsize,
 }
@@ -122,12 +122,19 @@ impl Entry {
 
     /// The same with its process.
     pub(super) fn watching<M: Watched>(self) -> Self {
-        Self { replay: Some(watched::replay::<M>), ..self }
+        Self { observed: Some(Observed::of::<M>()), ..self }
     }
 
-    /// The parts of a process one after another; `None` of a calculator whose process nobody watches.
-    pub(crate) fn replay(&self) -> Option<Replay> {
-        self.replay
+    /// How a process of it is watched; `None` of a calculator whose process nobody watches.
+    pub(crate) fn observed(&self) -> Option<&Observed> {
+        self.observed.as_ref()
+    }
+
+    /// Something that is checked and told in the contract like a job of that calculator, and is none.
+    pub(super) fn of_body<I: ToSchema>(meta: &Meta, adapt: impl Fn(&mut Value) + Send + Sync + 'static) -> Self {
+        let input = contract::of::<I>(meta.id, true, adapt);
+        let output = contract::of::<I>(meta.id, false, |_| {});
+        Self::new(meta, Contracts::Types { input, output }, Box::new(NoCalculator))
     }
 
     fn with_input<C: Calculator>(input: Make) -> Result<Self, RegistryError> {
@@ -189,7 +196,7 @@ impl Entry {
             calculation,
             composed: false,
             model_use: ModelUse::None,
-            replay: None,
+            observed: None,
             answer_bytes: AtomicUsize::new(0),
         }
     }

@@ -1,14 +1,185 @@
 //! Processes under watch of a calculator, with its types closed over.
 
-use precut_calc::calculator::{Failure, Finding, Monitor, Watched};
-use precut_calc::process::{DocumentOf, Outlook, PartOf, State, Watch, faults};
+use precut_calc::calculator::{
+    Calculator, Failure, Finding, ForwardModel, Measured, MeasuredRow, Measurement, Monitor, Watched,
+};
+use precut_calc::process::{Decision, DocumentOf, GaugeCheck, Options, Outlook, PartOf, State, Watch, faults};
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Value, json};
+use utoipa::openapi::{RefOr, Schema};
+use utoipa::{PartialSchema, ToSchema};
 
-use super::second_line;
+use super::{Entry, second_line};
 
 /// The parts of a process one after another.
-pub(crate) type Replay = fn(Value, &dyn Monitor) -> Result<Replayed, NotReplayed>;
+type Replay = fn(Value, &dyn Monitor) -> Result<Replayed, NotReplayed>;
+
+/// How a process of a calculator is watched.
+pub(crate) struct Observed {
+    pub(crate) replay: Replay,
+    /// A process before its first part, by its document.
+    pub(crate) begin: fn(Value) -> Result<Box<dyn Watching>, NotReplayed>,
+    /// Every fault of a document and of some parts, in whatever order.
+    pub(crate) faults: fn(Value, Vec<Value>) -> Vec<Finding>,
+    /// The path that a result commands, as conditions of a part that is cut on it; nothing where it commands none.
+    pub(crate) commanded: fn(Value) -> Option<Value>,
+    /// Conditions of a part that come and go, which may be told of the next one.
+    pub(crate) conditions: &'static [&'static str],
+    /// What a document and a part are made of as they are sent.
+    pub(crate) document: Box<Entry>,
+    pub(crate) part: Box<Entry>,
+}
+
+impl Observed {
+    pub(super) fn of<M: Watched>() -> Self {
+        let meta = <M as Calculator>::META;
+        let quantities: Vec<&str> = <M as ForwardModel>::QUANTITIES
+            .iter()
+            .map(|quantity| quantity.name)
+            .filter(|name| M::per_diameter_um(name) > 0.0)
+            .collect();
+        Self {
+            replay: replay::<M>,
+            begin: |document| Ok(Box::new(Watch::<M>::new(read(document, "")?))),
+            faults: |document, parts| read_all::<M>(document, parts).map_or_else(found, |(d, p)| faults::<M>(&d, &p)),
+            commanded: |result| {
+                let output: <M as Calculator>::Output = serde_json::from_value(result).ok()?;
+                serde_json::to_value(M::commanded(&output)?).ok()
+            },
+            // A registry lives as long as the process.
+            conditions: Vec::leak(M::conditions(&M::Run::default()).into_iter().map(|(name, _)| name).collect()),
+            document: Box::new(Entry::of_body::<ProcessBody<M::Allowances>>(&meta, move |body| {
+                let fields = &mut body["properties"];
+                fields["quantity"]["enum"] = json!(quantities);
+                fields["options"]["properties"]["path"] = json!({
+                    "type": "string", "enum": ["advise", "auto"], "default": "advise",
+                    "description": "Whether a new path is only proposed, or given out at once.",
+                });
+            })),
+            part: Box::new(Entry::of_body::<PartBody<M::Run, M::Row>>(&meta, |body| {
+                let conditions = &mut body["properties"]["conditions"];
+                conditions["properties"]["edge"] = json!({
+                    "type": "integer", "minimum": 0, "maximum": 1_000_000_000, "examples": [4],
+                    "x-unit": "1", "x-symbol": "i", "description": "Which cutting edge, counted up.",
+                });
+                conditions["properties"]["batch"] = json!({
+                    "type": "string", "maxLength": 100, "examples": ["H-1187"],
+                    "description": "Which batch of blanks.",
+                });
+            })),
+        }
+    }
+}
+
+/// A process as it is declared.
+#[derive(ToSchema)]
+#[allow(dead_code)] // the contract of a body that the engine reads
+struct ProcessBody<A: ToSchema> {
+    /// Whose jobs it cuts.
+    #[schema(example = "deflection-compensation")]
+    calculator: String,
+    /// What is cut: by the name that parts state, `{"job": ...}` with a whole job of the calculator.
+    #[schema(value_type = Object)]
+    part_types: Value,
+    /// Stored model that extends every job: `name` or `name@revision`.
+    #[schema(nullable = false, max_length = 80, example = "lathe-7")]
+    model: Option<String>,
+    /// Name of the quantity that is measured.
+    #[schema(example = "diameter_deviation_um")]
+    quantity: String,
+    /// How far one part scatters from the next without that being a change.
+    #[schema(inline, nullable = false)]
+    allowances: Option<A>,
+    /// Standard deviation of a single reading; learned from the first parts where it is not stated.
+    #[schema(exclusive_minimum = 0.0, maximum = 1000.0, example = 1.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("sigma"))))]
+    noise_um: Option<f64>,
+    /// How it is watched.
+    #[schema(inline, nullable = false)]
+    options: Option<Options>,
+    /// Whether a person stopped it: parts are recorded, nothing is commanded.
+    #[schema(default = false, nullable = false)]
+    stopped: Option<bool>,
+}
+
+/// A measured part as it is sent.
+#[derive(ToSchema)]
+#[allow(dead_code)] // the contract of a body that the engine reads
+struct PartBody<R: ToSchema, W: MeasuredRow + Measurement> {
+    /// Its place in the order of the process.
+    #[schema(minimum = 1, maximum = 1_000_000_000, example = 39, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("n"))))]
+    number: u32,
+    /// What it is: one of the process's `part_types`.
+    #[schema(max_length = 100, example = "A")]
+    part_type: String,
+    /// Conditions under which it was cut; what they leave out is as in the job.
+    #[schema(inline, nullable = false)]
+    conditions: Option<R>,
+    /// The path on which it was cut; stated once a path was given out.
+    #[schema(nullable = false)]
+    path: Option<PartPath>,
+    /// Readings of a master with the gauge that measured the part.
+    #[schema(nullable = false, max_items = 100)]
+    gauge_checks: Option<Vec<GaugeCheck>>,
+    /// What was measured, all in one run.
+    #[schema(schema_with = measurements::<W>)]
+    measurements: Measured<W>,
+}
+
+fn measurements<W: MeasuredRow>() -> RefOr<Schema> {
+    Measured::<W>::schema()
+}
+
+/// The path on which a part was cut.
+#[derive(ToSchema)]
+#[allow(dead_code)] // the contract of a body that the engine reads
+#[schema(as = PartPath)]
+struct PartPath {
+    /// `nominal`: the drawing's; `process`: one that the process gave out; `own`: that of `conditions.commanded_path`.
+    kind: PartPathKind,
+    /// Of a path of the process: which.
+    #[schema(nullable = false, minimum = 1, maximum = 1_000_000, example = 2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("r"))))]
+    revision: Option<u32>,
+}
+
+/// Where the path of a part comes from.
+#[derive(ToSchema)]
+#[allow(dead_code)] // the contract of a body that the engine reads
+#[schema(rename_all = "snake_case")]
+enum PartPathKind {
+    Nominal,
+    Process,
+    Own,
+}
+
+/// A process, part by part.
+pub(crate) trait Watching: Send + Sync {
+    /// A part more, of a higher number than all before it and without faults.
+    fn take(&mut self, part: Value, monitor: &dyn Monitor) -> Result<State, NotReplayed>;
+    /// The next part; nothing while the process is learned.
+    fn outlook(&mut self, monitor: &dyn Monitor) -> Result<Option<Outlook>, Failure>;
+    /// What a person says of a change, and what is said then; nothing where that does not fit.
+    fn decide(&mut self, change: &str, decision: &Decision) -> Option<State>;
+    /// The same once more.
+    fn copy(&self) -> Box<dyn Watching>;
+}
+
+impl<M: Watched> Watching for Watch<M> {
+    fn take(&mut self, part: Value, monitor: &dyn Monitor) -> Result<State, NotReplayed> {
+        Ok(Watch::take(self, &read(part, "")?, monitor)?)
+    }
+
+    fn outlook(&mut self, monitor: &dyn Monitor) -> Result<Option<Outlook>, Failure> {
+        Watch::outlook(self, monitor)
+    }
+
+    fn decide(&mut self, change: &str, decision: &Decision) -> Option<State> {
+        Watch::decide(self, change, decision)
+    }
+
+    fn copy(&self) -> Box<dyn Watching> {
+        Box::new(Watch::copy(self))
+    }
+}
 
 /// What was said after each part, and what is to be done before the next.
 pub(crate) struct Replayed {
@@ -17,6 +188,7 @@ pub(crate) struct Replayed {
 }
 
 /// Why nothing was said.
+#[derive(Debug)]
 pub(crate) enum NotReplayed {
     /// The process or a part is at fault.
     Faults(Vec<Finding>),
@@ -31,19 +203,28 @@ impl From<Failure> for NotReplayed {
 }
 
 /// Replays `{..., "parts": [...]}`, whose jobs are filled.
-pub(super) fn replay<M: Watched>(mut process: Value, monitor: &dyn Monitor) -> Result<Replayed, NotReplayed> {
+fn replay<M: Watched>(mut process: Value, monitor: &dyn Monitor) -> Result<Replayed, NotReplayed> {
     let parts = process.as_object_mut().and_then(|fields| fields.remove("parts")).unwrap_or_default();
-    let parts: Vec<Value> = read(parts, "/parts")?;
-    let each = parts.into_iter().enumerate();
-    let parts: Vec<PartOf<M>> =
-        each.map(|(index, part)| read(part, &format!("/parts/{index}"))).collect::<Result<_, _>>()?;
-    let document: DocumentOf<M> = read(process, "")?;
+    let (document, parts) = read_all::<M>(process, read(parts, "/parts")?)?;
     let found = faults::<M>(&document, &parts);
     if !found.is_empty() {
         return Err(NotReplayed::Faults(found));
     }
     let (mut watch, states) = Watch::<M>::replay(document, &parts, monitor)?;
     Ok(Replayed { states, outlook: watch.outlook(monitor)? })
+}
+
+fn read_all<M: Watched>(document: Value, parts: Vec<Value>) -> Result<(DocumentOf<M>, Vec<PartOf<M>>), NotReplayed> {
+    let each = parts.into_iter().enumerate();
+    let parts = each.map(|(index, part)| read(part, &format!("/parts/{index}"))).collect::<Result<_, _>>()?;
+    Ok((read(document, "")?, parts))
+}
+
+fn found(error: NotReplayed) -> Vec<Finding> {
+    match error {
+        NotReplayed::Faults(findings) => findings,
+        NotReplayed::Failed(failure) => vec![Finding::new("not_readable", "").with("reason", failure.to_string())],
+    }
 }
 
 fn read<T: DeserializeOwned>(value: Value, pointer: &str) -> Result<T, NotReplayed> {

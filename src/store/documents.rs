@@ -1,5 +1,5 @@
-//! Documents under names: stored models, the machines, tools and materials that jobs name, and parts of jobs. Each belongs to
-//! somebody and has revisions that never change.
+//! Documents under names: stored models, the machines, tools and materials that jobs name, parts of jobs, and processes under
+//! watch. Each belongs to somebody and has revisions that never change.
 
 use futures_util::future::BoxFuture;
 use sqlx::postgres::PgRow;
@@ -21,6 +21,8 @@ pub enum Kind {
     Material,
     /// A part of a job.
     Part,
+    /// A process under watch.
+    Process,
 }
 
 impl Kind {
@@ -32,6 +34,7 @@ impl Kind {
             Self::Tool => "tool",
             Self::Material => "material",
             Self::Part => "part",
+            Self::Process => "process",
         }
     }
 }
@@ -43,8 +46,8 @@ pub struct KeptDocument {
     pub name: String,
     /// From 1; a revision never changes.
     pub revision: u32,
-    /// What lists are filtered by: the calculator of a model, the kind of a machine or a tool, the group of a material, the
-    /// field of a part.
+    /// What lists are filtered by: the calculator of a model or a process, the kind of a machine or a tool, the group of a
+    /// material, the field of a part.
     pub class: String,
     /// Canonical JSON.
     pub content: String,
@@ -118,7 +121,7 @@ pub struct NewDocuments {
     pub owner: String,
     /// What he may take.
     pub quota: Quota,
-    /// So many revisions are kept at most, of everybody together; models are not counted.
+    /// So many revisions are kept at most, of everybody together; models and processes are not counted.
     pub most: u64,
 }
 
@@ -228,7 +231,7 @@ impl NewDocuments {
             return Some(PutDocuments::Taken);
         }
         let new = || self.documents.iter().zip(beside).filter(|(_, one)| one.is_err()).map(|(new, _)| new);
-        let counted = new().filter(|new| new.kind != Kind::Model).count() as u64;
+        let counted = new().filter(|new| !matches!(new.kind, Kind::Model | Kind::Process)).count() as u64;
         if counted > 0 && kept + counted > self.most {
             return Some(PutDocuments::Full);
         }

@@ -10,11 +10,13 @@ pub mod documents;
 pub mod jobs;
 mod ledger;
 mod postgres;
+pub mod processes;
 pub(crate) mod quota;
 mod row;
 pub mod sqlite;
 pub(crate) mod sqlite_documents;
 mod sqlite_jobs;
+mod sqlite_processes;
 mod sqlite_studies;
 #[cfg(test)]
 mod suite;
@@ -56,8 +58,8 @@ pub enum OpenError {
 }
 
 /// Everything that outlasts a process.
-pub trait Store: ResultStore + jobs::JobStore + documents::DocumentStore {}
-impl<S: ResultStore + jobs::JobStore + documents::DocumentStore> Store for S {}
+pub trait Store: ResultStore + jobs::JobStore + documents::DocumentStore + processes::ProcessStore {}
+impl<S: ResultStore + jobs::JobStore + documents::DocumentStore + processes::ProcessStore> Store for S {}
 
 /// Which store, and how it is used.
 #[derive(Debug, Clone)]

@@ -133,7 +133,11 @@ impl DocumentStore for SqliteStore {
     }
 }
 
-async fn put(connection: &mut SqliteConnection, new: &NewDocuments, now: i64) -> Result<PutDocuments, sqlx::Error> {
+pub(super) async fn put(
+    connection: &mut SqliteConnection,
+    new: &NewDocuments,
+    now: i64,
+) -> Result<PutDocuments, sqlx::Error> {
     let mut beside = Vec::with_capacity(new.documents.len());
     for document in &new.documents {
         let newest: Option<Newest> = sqlx::query_as(
@@ -146,9 +150,11 @@ async fn put(connection: &mut SqliteConnection, new: &NewDocuments, now: i64) ->
         .await?;
         beside.push(new.beside(document, newest.as_ref()));
     }
-    let kept: i64 = sqlx::query_scalar("SELECT count(*) FROM documents WHERE kind <> 'model' AND content IS NOT NULL")
-        .fetch_one(&mut *connection)
-        .await?;
+    let kept: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM documents WHERE kind NOT IN ('model', 'process') AND content IS NOT NULL",
+    )
+    .fetch_one(&mut *connection)
+    .await?;
     let usage = match new.quota.kept_bytes {
         Some(_) => Some(usage(connection, &new.owner, now).await?),
         None => None,

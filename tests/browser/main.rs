@@ -17,6 +17,7 @@ mod jobs;
 mod keys;
 mod matrix;
 mod offers;
+mod processes;
 mod records;
 mod rooms;
 mod screenshots;
@@ -26,6 +27,9 @@ mod sizes;
 mod studies;
 mod tables;
 mod words;
+
+#[path = "../support/stream.rs"]
+mod stream;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -8,6 +8,10 @@ mod glossary;
 mod markdown;
 mod physics;
 mod shown;
+mod tailstock;
+
+#[path = "../support/stream.rs"]
+mod stream;
 
 use std::path::Path;
 

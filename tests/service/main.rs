@@ -14,6 +14,9 @@ mod certificates;
 #[path = "../support/receiver.rs"]
 mod receiver;
 
+#[path = "../support/stream.rs"]
+mod stream;
+
 mod attack;
 mod bad_input;
 mod cases;
@@ -29,6 +32,7 @@ mod negotiation;
 mod owners;
 mod paper;
 mod process;
+mod processes;
 mod quotas;
 mod results;
 mod roundness;

@@ -9,26 +9,29 @@ use serde_json::Value;
 use crate::support::{Server, header, problem, toy};
 
 /// Keys by name, owner and scopes.
-const KEYS: [(&str, &str, &[Scope]); 5] = [
-    ("a-one", "alpha", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
-    ("a-two", "alpha", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
-    ("b", "beta", &[Scope::Solve, Scope::Read, Scope::Models, Scope::Library]),
-    ("reader", "alpha", &[Scope::Read]),
-    ("root", "root", &[Scope::Admin]),
-];
+fn keys() -> [(&'static str, &'static str, Vec<Scope>); 6] {
+    [
+        ("a-one", "alpha", Scope::usual()),
+        ("a-two", "alpha", Scope::usual()),
+        ("b", "beta", Scope::usual()),
+        ("reader", "alpha", vec![Scope::Read]),
+        ("station", "alpha", vec![Scope::Parts(Some("shaft-560".to_owned()))]),
+        ("root", "root", vec![Scope::Admin]),
+    ]
+}
 
 fn secret(name: &str) -> String {
     format!("the secret key of {name}")
 }
 
 pub fn with_keys(config: &mut Config) {
-    let key = |(name, owner, scopes): (&str, &str, &[Scope])| ApiKey {
+    let key = |(name, owner, scopes): (&str, &str, Vec<Scope>)| ApiKey {
         name: name.to_owned(),
         hash: auth::hash(&secret(name)).to_string(),
         owner: Some(owner.to_owned()),
-        scopes: scopes.to_vec(),
+        scopes,
     };
-    config.auth.keys = KEYS.map(key).to_vec();
+    config.auth.keys = keys().map(key).to_vec();
 }
 
 /// A server, asked with a key.

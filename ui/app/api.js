@@ -191,6 +191,20 @@ export const saveModel = (name, source) =>
 export const dropModel = name => ask(`/v1/models/${enc(name)}`, { method: 'DELETE' });
 export const model = name => json(`/v1/models/${enc(name)}`);
 
+/** The processes under watch of the first page, by name. */
+export const processes = async () => (await json('/v1/processes?limit=500')).items;
+const processAt = name => `/v1/processes/${enc(name)}`;
+export const process = name => json(processAt(name));
+export const processFigures = async name => (await json(`${processAt(name)}/figures`)).items;
+/** Something that a process gives out, as a file. */
+export const processFile = async (name, rest, accept) => (await ask(processAt(name) + rest, { headers: { Accept: accept } })).blob();
+export const decideChange = (name, change, decision) =>
+  json(`${processAt(name)}/changes/${enc(change)}`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json' },
+    body: JSON.stringify({ decision }),
+  });
+
 /** Follows a job's events until it is over; connects again where the line breaks. Returns how to stop.
  *  @param {string} id @param {Partial<Record<'onState' | 'onProgress' | 'onInterim' | 'onDone' | 'onTrouble', (what: any) => void>>} handlers */
 export function follow(id, { onState, onProgress, onInterim, onDone, onTrouble }) {

@@ -6,6 +6,7 @@ import { Room } from './room.js';
 import { Study } from './study.js';
 import { Home, Jobs, Results, Models } from './pages.js';
 import { Library } from './library.js';
+import { Processes } from './process.js';
 
 const JOBS_LOOK_MS = 4000;
 /** So many jobs of a state are counted. */
@@ -147,7 +148,7 @@ function App() {
 
   const known = calculators?.find(({ id }) => id === page);
   useEffect(() => {
-    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models'), library: t('records') };
+    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models'), processes: t('processes'), library: t('records') };
     document.title = known ? `${known.title} – precut` : names[page] ? `${names[page]} – precut` : 'precut';
   }, [page, known, spoken]);
   const first = useRef(true);
@@ -200,6 +201,8 @@ function Page({ page, query, calculators, known, needsKey, models, refreshModels
       return html`<${Study} key=${attempt} ...${{ calculators, query, push, replace, refreshJobs }} />`;
     case 'models':
       return html`<${Models} calculators=${calculators} models=${models} refreshModels=${refreshModels} />`;
+    case 'processes':
+      return html`<${Processes} key=${spoken} query=${query} />`;
     case 'library':
       return html`<${Library} key=${spoken} calculators=${calculators} models=${models} />`;
     default:
@@ -246,6 +249,7 @@ function Header({ page, calculators, running, models, known }) {
         ${link('jobs', t('jobs'), running && html`<span class="count"><span aria-hidden="true">${running}</span><span class="hidden">, ${running} ${t('open_jobs')}</span></span>`)}
         ${link('results', t('results'))}
         ${(models !== null || page === 'models') && link('models', t('models'))}
+        ${link('processes', t('processes'))}
         <a href="/docs" class="docs-link">${t('docs')}</a>
       </nav>
       <div class="languages" role="group" aria-label=${t('language')}>

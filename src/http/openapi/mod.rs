@@ -6,6 +6,7 @@ mod library;
 mod models;
 mod named;
 mod parts;
+mod processes;
 mod rooms;
 
 use std::collections::BTreeMap;
@@ -66,7 +67,7 @@ pub fn document(registry: &Registry) -> Value {
     for (address, path) in jobs::paths(registry).into_iter().chain(models::paths()).chain(fixed::paths(registry)) {
         paths = paths.path(address, path);
     }
-    for (address, path) in library::paths() {
+    for (address, path) in library::paths().into_iter().chain(processes::paths(registry)) {
         paths = paths.path(address, path);
     }
     for (name, schema) in parts::schemas()
@@ -75,6 +76,7 @@ pub fn document(registry: &Registry) -> Value {
         .chain(jobs::schemas())
         .chain(models::schemas())
         .chain(library::schemas())
+        .chain(processes::schemas(registry))
     {
         let before = schemas.insert(name.clone(), schema.clone());
         debug_assert!(before.is_none_or(|before| before == schema), "two schemas are called {name}");

@@ -17,12 +17,13 @@ use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
 
-pub(super) const TAGS: [(&str, &str); 8] = [
+pub(super) const TAGS: [(&str, &str); 9] = [
     ("calculators", "Predict and decide from a model of the process."),
     ("evaluations", "Evaluate data that the user brings."),
     ("studies", "Vary one to three fields of any of them."),
     ("jobs", "Calculations that take long: watched, cancelled, and their results."),
     ("models", "What diagnoses found, stored for later jobs."),
+    ("processes", "Parts that come one after another: what changed, since which part, what now."),
     ("library", "What can be asked, and the data of the engine."),
     ("results", "Kept answers, read again without computing."),
     ("service", "Health, figures, documentation."),
@@ -37,7 +38,7 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
 }
 
 /// Problems by status: name of the response, what it means.
-const PROBLEMS: [(u16, &str, &str); 19] = [
+const PROBLEMS: [(u16, &str, &str); 21] = [
     (400, "BadRequest", "The request or the body's JSON is malformed: `errors` has line and column."),
     (401, "Unauthorized", "A key is needed, or the one sent is none."),
     (403, "Forbidden", "The key may not do this: it lacks the scope in `detail`."),
@@ -51,6 +52,11 @@ const PROBLEMS: [(u16, &str, &str); 19] = [
         "Gone",
         "The result is kept no longer, or was made by another version of its calculator and cannot be drawn any more.",
     ),
+    (
+        412,
+        "PreconditionFailed",
+        "What is there is not what the request names in `If-Match`, or something has the name already.",
+    ),
     (413, "PayloadTooLarge", "The body is larger than the limit in `detail`."),
     (414, "UriTooLong", "The address is longer than 8 KiB."),
     (415, "UnsupportedMediaType", "The body is of another type than those in `detail`."),
@@ -59,6 +65,7 @@ const PROBLEMS: [(u16, &str, &str); 19] = [
         "Unprocessable",
         "The job breaks rules (every fault is in `errors`), is too expensive, or has no answer: infeasible, outside the model, not converged. Then `code` says why and `detail` what would make it possible.",
     ),
+    (428, "PreconditionRequired", "Something else is there: a change names its `ETag` in `If-Match`."),
     (
         429,
         "TooManyRequests",

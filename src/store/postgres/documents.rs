@@ -94,7 +94,7 @@ impl DocumentStore for PostgresStore {
     }
 }
 
-async fn put(connection: &mut PgConnection, new: NewDocuments) -> Result<PutDocuments, sqlx::Error> {
+pub(super) async fn put(connection: &mut PgConnection, new: NewDocuments) -> Result<PutDocuments, sqlx::Error> {
     // One after the other, so that no two take the same number.
     sqlx::query("SELECT generation FROM precut.library FOR UPDATE").execute(&mut *connection).await?;
     let mut beside = Vec::with_capacity(new.documents.len());
@@ -110,7 +110,7 @@ async fn put(connection: &mut PgConnection, new: NewDocuments) -> Result<PutDocu
         beside.push(new.beside(document, newest.as_ref()));
     }
     let (now, kept): (i64, i64) = sqlx::query_as(
-        "SELECT precut.now_ms(), count(*) FROM precut.documents WHERE kind <> 'model' AND content IS NOT NULL",
+        "SELECT precut.now_ms(), count(*) FROM precut.documents WHERE kind NOT IN ('model', 'process') AND content IS NOT NULL",
     )
     .fetch_one(&mut *connection)
     .await?;

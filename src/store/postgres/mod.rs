@@ -12,6 +12,7 @@ mod documents;
 mod jobs;
 mod line;
 mod news;
+mod processes;
 mod record;
 mod results;
 mod run;

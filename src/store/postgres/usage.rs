@@ -20,7 +20,9 @@ pub(super) async fn usage(connection: &mut PgConnection, owner: &str) -> Outcome
              WHERE owner = $1 AND (expires_ms IS NULL OR expires_ms > $2) GROUP BY key) AS results
          GROUP BY until / $3
          UNION ALL
-         SELECT NULL, sum(bytes)::bigint FROM precut.documents WHERE owner = $1 AND content IS NOT NULL HAVING count(*) > 0",
+         SELECT NULL, sum(bytes)::bigint FROM precut.documents WHERE owner = $1 AND content IS NOT NULL HAVING count(*) > 0
+         UNION ALL
+         SELECT NULL, sum(bytes)::bigint FROM precut.process_entries WHERE owner = $1 HAVING count(*) > 0",
     )
     .bind(owner)
     .bind(now)
@@ -57,7 +59,9 @@ pub(super) async fn kept_by_owner(pool: &PgPool) -> Outcome<Vec<(String, u64)>> 
              WHERE starts_with(owner, 'key:') AND (expires_ms IS NULL OR expires_ms > precut.now_ms())
              GROUP BY owner, key
              UNION ALL
-             SELECT owner, bytes FROM precut.documents WHERE starts_with(owner, 'key:') AND content IS NOT NULL) AS results
+             SELECT owner, bytes FROM precut.documents WHERE starts_with(owner, 'key:') AND content IS NOT NULL
+             UNION ALL
+             SELECT owner, bytes FROM precut.process_entries WHERE starts_with(owner, 'key:')) AS results
          GROUP BY owner",
     )
     .fetch_all(pool)

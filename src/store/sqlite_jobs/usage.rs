@@ -13,7 +13,9 @@ pub(in crate::store) async fn usage(connection: &mut SqliteConnection, owner: &s
              WHERE owner = ?1 AND (expires_ms IS NULL OR expires_ms > ?2) GROUP BY key)
          GROUP BY until / ?3
          UNION ALL
-         SELECT NULL, sum(bytes) FROM documents WHERE owner = ?1 AND content IS NOT NULL HAVING count(*) > 0",
+         SELECT NULL, sum(bytes) FROM documents WHERE owner = ?1 AND content IS NOT NULL HAVING count(*) > 0
+         UNION ALL
+         SELECT NULL, sum(bytes) FROM process_entries WHERE owner = ?1 HAVING count(*) > 0",
     )
     .bind(owner)
     .bind(now)
@@ -48,7 +50,9 @@ pub(super) async fn kept_by_owner(connection: &mut SqliteConnection, now: i64) -
              SELECT owner, sum(input_bytes) + max(result_bytes) AS bytes FROM precut_jobs
              WHERE owner > 'key:' AND owner < 'key;' AND (expires_ms IS NULL OR expires_ms > ?1) GROUP BY owner, key
              UNION ALL
-             SELECT owner, bytes FROM documents WHERE owner > 'key:' AND owner < 'key;' AND content IS NOT NULL)
+             SELECT owner, bytes FROM documents WHERE owner > 'key:' AND owner < 'key;' AND content IS NOT NULL
+             UNION ALL
+             SELECT owner, bytes FROM process_entries WHERE owner > 'key:' AND owner < 'key;')
          GROUP BY owner",
     )
     .bind(now)

@@ -4,6 +4,7 @@
 pub(in crate::store) mod callbacks;
 pub(in crate::store) mod documents;
 pub(in crate::store) mod jobs;
+pub(in crate::store) mod processes;
 pub(in crate::store) mod results;
 
 use std::time::Duration;
@@ -160,6 +161,11 @@ macro_rules! suite {
             kinds_and_shelves_are_apart
             several_are_kept_together_or_none_of_them
             documents_count_for_who_stores_them_until_they_are_deleted
+        }
+        suite! { $place, processes:
+            a_record_grows_without_a_gap_whoever_is_first
+            parts_are_corrected_and_withdrawn_with_their_history
+            a_process_counts_for_its_owner_until_it_is_deleted
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed

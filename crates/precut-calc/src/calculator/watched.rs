@@ -52,6 +52,9 @@ pub trait Watched: Diagnosable {
 
     /// A place along the part, as a share of its length.
     fn point_along(job: &Self::Job, share: f64) -> Self::Point;
+
+    /// The path that an answer commands, as a run that was cut on it states it; nothing where the answer has no whole path.
+    fn commanded(output: &Self::Output) -> Option<Self::Run>;
 }
 
 /// A run that may tell causes apart.

@@ -8,6 +8,7 @@ use crate::effects::DeflectionEffect;
 use super::DeflectionCompensation;
 use super::forward::{CommandedPoint, DeflectionPoint, DeflectionRun};
 use super::input::{Detail, IncludeMode, Job};
+use super::output::Path;
 
 /// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between
 /// them is missed by less than 0.03 % of its height, (pi/128)^2/2.
@@ -80,16 +81,20 @@ pub(super) fn compensated(
         Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
-    let Some(path) = path.filter(|path| path.complete) else { return Ok(None) };
-    let length_mm: f64 = job.shaft.segments.iter().map(|segment| segment.length_mm).sum();
+    Ok(path.as_ref().and_then(corners))
+}
+
+/// The corners of a path, ascending; `None` of one that is not complete.
+pub(super) fn corners(path: &Path) -> Option<Vec<CommandedPoint>> {
     let mut corners: Vec<CommandedPoint> = Vec::new();
+    let length_mm: f64 = path.zones.iter().filter_map(|zone| zone.z_mm.last()).fold(0.0, |most, z| z.max(most));
     for zone in &path.zones {
         for (&z_mm, &diameter_mm) in zone.z_mm.iter().zip(&zone.commanded_diameter_mm) {
             let after = corners.last().map_or(z_mm, |before| before.z_mm + BESIDE * length_mm);
             corners.push(CommandedPoint { z_mm: z_mm.max(after), diameter_mm });
         }
     }
-    Ok(Some(corners))
+    path.complete.then_some(corners)
 }
 
 /// The corners of a path and places between them, ascending.

@@ -15,7 +15,7 @@ use crate::shaft::places;
 use super::DeflectionCompensation;
 use super::acting::{Acting, StructureChange, error_um};
 use super::check::outside_shaft;
-use super::consequence::{compensated, consequences};
+use super::consequence::{compensated, consequences, corners};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design, remainder_name};
@@ -23,6 +23,7 @@ use super::input::{Aim, FeedDirection, IncludeMode, Job, Stations, Theory, Toler
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, wanted};
 use super::next_runs::next_runs;
+use super::output::Outcome;
 use super::regime::{Regime, Step, cut_path_m, passages, section_of_pass};
 use super::structure::{Structure, Variant};
 
@@ -524,6 +525,11 @@ impl Watched for DeflectionCompensation {
 
     fn point_along(job: &Job, share: f64) -> DeflectionPoint {
         DeflectionPoint { z_mm: share * job.shaft.length_mm() }
+    }
+
+    fn commanded(output: &Outcome) -> Option<DeflectionRun> {
+        let commanded_path = output.path.as_ref().and_then(corners).filter(|corners| !corners.is_empty())?;
+        Some(DeflectionRun { commanded_path, ..DeflectionRun::default() })
     }
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::memory::Memory;
 use super::outlook::Expected;
 use super::sight::{GAUGE, Sighting};
-use super::state::{Action, ActionKind, Change, ChangeVerdict, ChangedCause, Forecast};
+use super::state::{Action, ActionKind, Change, ChangeVerdict, ChangedCause, Decided, Forecast};
 use crate::calculator::Limits;
 
 /// A new path only where the mean deviation is this much larger than what is unsure of it, and than what a part scatters.
@@ -42,7 +42,7 @@ pub(super) fn of(
     limits: Limits,
 ) -> Action {
     let act = |kind, code| Action { kind, code };
-    let change = memory.changes.last();
+    let change = memory.changes.last().filter(|change| change.decided != Some(Decided::Rejected));
     if change.is_some_and(|change| change.causes.iter().any(|cause| cause.kind == GAUGE)) {
         return act(ActionKind::MeasureGauge, "process_gauge_may_have_moved");
     }

@@ -5,7 +5,7 @@ use super::memory::Memory;
 use super::null::{Column, Null, Older, Source, Told};
 use super::onsets::{Entry, What};
 use super::report;
-use super::state::{OddPart, Situation};
+use super::state::{Change, OddPart, Situation};
 use super::verdict::{Judgement, judged};
 
 /// An accepted change goes on being refined for so many parts.
@@ -72,7 +72,7 @@ impl Memory {
     }
 
     /// All hypotheses, the statistic beside its threshold, and the number of a part that is odd.
-    fn weighed(&self) -> Option<(Vec<Entry>, f64, Option<u32>)> {
+    pub(super) fn weighed(&self) -> Option<(Vec<Entry>, f64, Option<u32>)> {
         self.with_null(|told, null| {
             let entries = self.scale().entries(told, null, self.first);
             let statistic = statistic(&self.options, &entries, told, null, &self.scale());
@@ -107,7 +107,7 @@ impl Memory {
     }
 
     /// A change joins what is free.
-    fn accept(&mut self, number: u32, judgement: &Judgement) {
+    pub(super) fn accept(&mut self, number: u32, judgement: &Judgement) {
         let Some(pending) = self.pending.take() else { return };
         for suspect in judgement.list.iter().take(MOST_CAUSES) {
             let since = Some((judgement.since, suspect.form));
@@ -153,7 +153,9 @@ impl Memory {
         let mut entries = self.scale().entries(&told, &null, accepted.first);
         entries.retain(|entry| entry.since <= accepted.joined);
         let Some(judgement) = judged(&entries, &self.catalogue, &told) else { return };
-        if let Some(change) = self.changes.iter_mut().find(|change| change.id == accepted.id) {
+        // What a person said stays.
+        let own = |change: &&mut Change| change.id == accepted.id && change.decided.is_none();
+        if let Some(change) = self.changes.iter_mut().find(own) {
             *change = report::change(&accepted.id, change.reported_at_part, true, &judgement, &self.catalogue);
         }
     }
@@ -169,7 +171,7 @@ impl Memory {
 }
 
 impl Accepted {
-    fn owns(&self, column: &Column) -> bool {
+    pub(super) fn owns(&self, column: &Column) -> bool {
         column.since.is_some_and(|(since, _)| since == self.since)
     }
 }

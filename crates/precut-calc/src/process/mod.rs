@@ -13,7 +13,7 @@
 //! - `verdict`: which cause, since when, how large (`process/3.5`);
 //! - `outlook`, `action`, `measure`, `next`: the next part (`process/4`, `process/5`);
 //! - `account`: what paths brought (`process/6`);
-//! - `memory`, `follow`: what is remembered of the parts, and of a change from its alarm on;
+//! - `memory`, `follow`, `decide`: what is remembered of the parts, of a change from its alarm on, and what a person says of it;
 //! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
 //!
 //! The state is a function of the document and of the parts in the order of their numbers, and of nothing else. It holds no
@@ -22,6 +22,7 @@
 mod account;
 mod action;
 mod check;
+mod decide;
 mod detector;
 mod document;
 mod edges;
@@ -43,6 +44,7 @@ mod watch;
 pub use account::{Gain, OnPath, PartGain};
 pub use action::ACTION_CODES;
 pub use check::{CODES as FAULT_CODES, faults};
+pub use decide::Decision;
 pub use document::{Document, GaugeCheck, MOST_PARTS, Options, Part, PartType, Threshold};
 pub use next::Next;
 pub use report::EXPLANATION_CODES;

@@ -36,6 +36,7 @@ pub(super) fn change(id: &str, reported: u32, accepted: bool, judgement: &Judgem
         since_part: judgement.since,
         since_parts_90: judgement.since_90,
         accepted,
+        decided: None,
         causes: judgement.list.iter().map(|suspect| cause(suspect, catalogue)).collect(),
     }
 }

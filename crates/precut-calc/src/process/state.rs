@@ -116,6 +116,18 @@ pub enum ChangeForm {
     Drift,
 }
 
+/// What a person says of a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decided {
+    /// It is one.
+    Confirmed,
+    /// It is none: what the parts show belongs to the process.
+    Rejected,
+    /// It is this cause.
+    Named,
+}
+
 /// A change.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
@@ -131,6 +143,9 @@ pub struct Change {
     pub since_parts_90: [u32; 2],
     /// Whether it is part of the model.
     pub accepted: bool,
+    /// What a person said of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decided: Option<Decided>,
     /// Causes that together have 95 %, likeliest first.
     pub causes: Vec<ChangedCause>,
 }

@@ -1,0 +1,115 @@
+//! The state of a process: as JSON, as a table, as a picture.
+
+use std::fmt::Write as _;
+
+use axum::Extension;
+use axum::extract::{Path, State};
+use axum::http::header::CONTENT_TYPE;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri};
+use axum::response::Response;
+use serde_json::Value;
+
+use super::super::auth::Caller;
+use super::super::negotiate::{self, Media};
+use super::super::problem::Problem;
+use super::super::query::Query;
+use super::super::{App, answer};
+use super::figures::{self, FIGURES};
+use super::tagged;
+use crate::engine::in_language;
+use crate::store::processes::KeptPart;
+
+/// Tables of a process.
+const TABLES: &[&str] = &["parts", "changes"];
+/// Parts that are read at once.
+const PAGE: u32 = 1000;
+
+/// `GET /v1/processes/{name}/state`
+pub(super) async fn state(
+    State(app): State<App>,
+    Extension(caller): Extension<Caller>,
+    Path(name): Path<String>,
+    uri: Uri,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let mut query = Query::of(&uri, &["table", "figure"])?;
+    let table = query.one_of("table", TABLES, |table| table)?;
+    let figure = query.one_of("figure", FIGURES, |figure| figure)?;
+    let offered = [Media::Json, Media::Csv, Media::Svg];
+    let media = negotiate::media(&headers, &offered).ok_or_else(|| answer::not_acceptable(&offered))?;
+    let process = app.engine.process(&caller.shelf(), &name).await?;
+    let language = negotiate::language(&headers);
+    if media == Media::Json {
+        let state = process.state.clone().map_or(Value::Null, |state| in_language(state, language));
+        return Ok(tagged(&state, Some(&process.tag()), language, &headers, StatusCode::OK));
+    }
+    if media == Media::Svg {
+        let id = figure.unwrap_or("chart");
+        let figures = figures::all(&app, &caller.shelf(), &process).await?;
+        let figure = figures.iter().find(|figure| figure.id == id);
+        let figure = figure.ok_or_else(|| Problem::missing("unknown_figure", id).with("available", "chart"))?;
+        let mut response = Response::new(answer::drawn(figure, language).into());
+        response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(Media::Svg.content_type()));
+        return Ok(response);
+    }
+    let text = match table {
+        Some("changes") => changes(process.state.as_ref()),
+        _ => {
+            let (mut text, mut from) = (HEADER.to_owned(), 0);
+            loop {
+                let page = app.engine.process_parts(&caller.shelf(), &name, (from, i64::MAX), PAGE).await?;
+                let Some(last) = page.last().and_then(|part| part.number) else { break };
+                from = last + 1;
+                page.iter().for_each(|part| text.push_str(&row(part)));
+            }
+            text
+        }
+    };
+    let mut response = Response::new(text.into());
+    response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/csv; charset=utf-8"));
+    Ok(response)
+}
+
+const HEADER: &str = "number,part,state,unused,evidence,chi2,p,change\n";
+
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn row(part: &KeptPart) -> String {
+    let now: Value = serde_json::from_str(&part.now).unwrap_or_default();
+    let number = part.number.unwrap_or_default();
+    let of = |pointer: &str| now.pointer(pointer).map(plain).unwrap_or_default();
+    let cells = ["/state", "/unused", "/evidence", "/score/chi2", "/score/p", "/change"].map(of);
+    format!("{number},{},{}\n", part.part, cells.join(","))
+}
+
+fn changes(state: Option<&Value>) -> String {
+    let mut text =
+        "id,since_part,from_part,to_part,reported_at_part,verdict,accepted,decided,cause,share,parameter,delta,lower,upper,unit\n"
+            .to_owned();
+    let all = state.and_then(|state| state["changes"].as_array()).into_iter().flatten();
+    for change in all {
+        for cause in change["causes"].as_array().into_iter().flatten() {
+            let of_change = [
+                "/id",
+                "/since_part",
+                "/since_parts_90/0",
+                "/since_parts_90/1",
+                "/reported_at_part",
+                "/verdict",
+                "/accepted",
+                "/decided",
+            ]
+            .map(|pointer| change.pointer(pointer).map(plain).unwrap_or_default());
+            let of_cause = ["/kind", "/share", "/parameter", "/delta", "/interval_95/0", "/interval_95/1", "/unit"]
+                .map(|pointer| cause.pointer(pointer).map(plain).unwrap_or_default());
+            let _ = writeln!(text, "{},{}", of_change.join(","), of_cause.join(","));
+        }
+    }
+    text
+}
