@@ -6,6 +6,7 @@
 
 pub mod calculator;
 pub mod certainty;
+pub mod clamping;
 pub mod compliance_fit;
 pub mod deflection_compensation;
 pub mod diagnosis;

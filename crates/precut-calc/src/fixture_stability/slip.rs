@@ -5,12 +5,16 @@
 //! N_1 + N_2 = 2 F less what the motion takes from both joints. (h/r_e)^2 is the couple of a force at the height h over the
 //! middle of the jaws, by the ellipsoid that bounds force and couple of a face that is pressed evenly.
 
+use crate::clamping::{against_slip_n, friction_needed};
+
 use super::acting::Case;
 use super::cutting::{Cutting, Stretch};
 use super::floquet::Working;
 use super::input::{Friction, JawGrip};
 use super::response::{Moment, Response};
 
+/// Jaws that press with the clamp force each: N_1 + N_2 is so many times it.
+const JAWS: f64 = 2.0;
 /// Angles that differ by less than this, rad, are one.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
@@ -78,7 +82,7 @@ pub(super) fn along(case: &Case, working: Working) -> Along {
 
 /// Least clamp force, N, that holds steady loads by a friction: the mean ones, without vibration.
 pub(super) fn steady_n(loads: &Along, grip: &Grip, friction: f64) -> f64 {
-    pushed_n(grip, loads.across.mean_n, loads.upward.mean_n) / (2.0 * friction)
+    against_slip_n(pushed_n(grip, loads.across.mean_n, loads.upward.mean_n), friction, JAWS, 0.0)
 }
 
 fn pushed_n(grip: &Grip, across_n: f64, upward_n: f64) -> f64 {
@@ -155,21 +159,13 @@ impl Pushing {
 
     /// Least clamp force, N, that holds at every instant with a friction.
     pub(super) fn least_n(&self, friction: f64) -> f64 {
-        self.largest(|at| 0.5 * (at.pushed_n / friction + at.unloading_n)).max(0.0)
+        self.largest(|at| against_slip_n(at.pushed_n, friction, JAWS, -at.unloading_n)).max(0.0)
     }
 
     /// Least friction with which a clamp force holds at every instant; `None` where a moment leaves no normal force.
     pub(super) fn friction_needed(&self, clamp_force_n: f64) -> Option<f64> {
-        let needed = self.largest(|at| {
-            let pressed_n = 2.0 * clamp_force_n - at.unloading_n;
-            if at.pushed_n <= 0.0 {
-                0.0
-            } else if pressed_n > 0.0 {
-                at.pushed_n / pressed_n
-            } else {
-                f64::INFINITY
-            }
-        });
+        let needed = self
+            .largest(|at| friction_needed(at.pushed_n, JAWS * clamp_force_n - at.unloading_n).unwrap_or(f64::INFINITY));
         needed.is_finite().then_some(needed)
     }
 }

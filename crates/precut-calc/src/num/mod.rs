@@ -12,5 +12,6 @@ pub mod hull;
 pub mod lsq;
 pub mod quadrature;
 pub mod roundness;
+pub mod socp;
 pub mod stats;
 pub mod table;
