@@ -109,12 +109,6 @@ impl<M: Watched> Watch<M> {
         }
     }
 
-    /// The same once more: what comes to one of them does not come to the other.
-    #[must_use]
-    pub fn copy(&self) -> Self {
-        Self { eye: self.eye.copy(), memory: self.memory.clone(), last: self.last.clone() }
-    }
-
     /// How many parts and how many onsets are in memory, and how many columns are free: bounded, however many parts came.
     pub fn size(&self) -> [usize; 3] {
         let onsets = self.memory.with_told(|memory, told| {
