@@ -88,6 +88,7 @@ mod milling_reference;
 mod path_chords;
 mod process_figures;
 mod process_gain;
+mod process_loop;
 mod process_streams;
 mod process_support;
 mod process_watch;

@@ -166,8 +166,8 @@ fn chart_delay(chart: Chart, limit: f64, white: &[DVector<f64>]) -> u32 {
 
 fn median_and_90(mut delays: Vec<u32>) -> String {
     delays.sort_unstable();
-    let at = |share: f64| delays[((delays.len() - 1) as f64 * share).round() as usize];
-    format!("{} ({})", at(0.5), at(0.9))
+    let at = |of: usize, all: usize| delays[((delays.len() - 1) * of + all / 2) / all];
+    format!("{} ({})", at(1, 2), at(9, 10))
 }
 
 /// `PRECUT_PROCESS_DRAWS=8` draws the tables of the documentation anew.

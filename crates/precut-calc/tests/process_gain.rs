@@ -140,5 +140,5 @@ fn the_account_of_parts_that_left_the_memory_stays() {
     assert_eq!((early.parts_cut_with_new_path, late.parts_cut_with_new_path), (40, 40));
     assert!(early.parts_spoilt > 35.0 && early.parts_saved < 0.5 && early.form_gain_um < -1000.0, "{early:?}");
     assert!((late.form_gain_um / early.form_gain_um - 1.0).abs() < 0.01, "{early:?} {late:?}");
-    assert_eq!(early.parts_spoilt.round(), late.parts_spoilt.round());
+    assert!((early.parts_spoilt - late.parts_spoilt).abs() < 0.5);
 }

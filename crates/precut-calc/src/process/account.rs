@@ -308,7 +308,7 @@ impl Weighed {
             let mean = all.iter().sum::<f64>() / all.len() as f64;
             (mean, interval(&mut all))
         };
-        let (form_um, form_interval_95) = spread(&|shape| shape.form());
+        let (form_um, form_interval_95) = spread(&Shape::form);
         let (size_um, size_interval_95) = spread(&|shape| shape.mean);
         let within = shapes.iter().filter(|shape| shape.fits(&self.limits)).count();
         let is_limited = self.limits != Limits::default();
@@ -396,7 +396,9 @@ impl<M: Watched> Watch<M> {
             return Ok(());
         }
         let weighed = self.weighed(&left, monitor)?;
-        weighed.iter().for_each(|part| self.account.closed.add(part));
+        for part in &weighed {
+            self.account.closed.add(part);
+        }
         Ok(())
     }
 
@@ -407,7 +409,9 @@ impl<M: Watched> Watch<M> {
         self.account.open = open;
         let weighed = weighed?;
         let mut totals = self.account.closed.clone();
-        weighed.iter().for_each(|part| totals.add(part));
+        for part in &weighed {
+            totals.add(part);
+        }
         Ok((totals.told(), weighed.iter().map(Weighed::told).collect()))
     }
 

@@ -11,6 +11,8 @@ use crate::calculator::Limits;
 /// A new path only where the mean deviation is this much larger than what is unsure of it, and than what a part scatters.
 const OVER_UNSURE: f64 = 1.5;
 const OVER_SCATTER: f64 = 0.5;
+/// And only where the path that the calculator really gives leaves at most this share of its mean square.
+const LEFT: f64 = 0.5;
 /// Below this probability, even with the best path, a person is called.
 const LIKELY: f64 = 0.9;
 /// Share of the tolerance of form from which on something without a name is too large to be left alone, and from which on two
@@ -33,11 +35,24 @@ pub const ACTION_CODES: &[&str] = &[
     "process_offset_limit",
 ];
 
+/// What is expected of the next part on the path in use and, where that leaves the dead band, on the path that was tried.
+pub(super) struct Expectation<'a> {
+    pub(super) now: &'a Expected,
+    pub(super) tried: Option<&'a Expected>,
+    /// One standard deviation of what parts scatter by themselves, a column each.
+    pub(super) scatter: &'a DMatrix<f64>,
+}
+
+/// Whether a deviation is more than what is unsure of it, and than what parts scatter anyway.
+pub(super) fn is_beyond_dead_band(expected: &Expected, scatter: &DMatrix<f64>) -> bool {
+    let square = expected.mean.norm_squared();
+    square > OVER_UNSURE * expected.variance.sum() && square > OVER_SCATTER.powi(2) * scatter.norm_squared()
+}
+
 pub(super) fn of(
     memory: &Memory,
     part: &Sighting,
-    expected: &Expected,
-    scatter: &DMatrix<f64>,
+    expected: &Expectation<'_>,
     forecast: &Forecast,
     limits: Limits,
 ) -> Action {
@@ -46,16 +61,14 @@ pub(super) fn of(
     if change.is_some_and(|change| change.causes.iter().any(|cause| cause.kind == GAUGE)) {
         return act(ActionKind::MeasureGauge, "process_gauge_may_have_moved");
     }
-    if let Some(code) = calls_person(memory, part, expected, forecast, limits, change) {
+    if let Some(code) = calls_person(memory, part, expected.now, forecast, limits, change) {
         return act(ActionKind::CallPerson, code);
     }
     if change.is_some_and(|change| !change.accepted && call_for_different_paths(memory, part, change, limits)) {
         return act(ActionKind::MeasureMore, "process_causes_call_for_different_paths");
     }
-    let rows = expected.mean.len() as f64;
-    let size = expected.mean.norm_squared() / rows;
-    let own = scatter.norm_squared() / rows;
-    if size > OVER_UNSURE * expected.variance.sum() / rows && size > OVER_SCATTER.powi(2) * own {
+    let is_worth_it = |tried: &Expected| tried.mean.norm_squared() <= LEFT * expected.now.mean.norm_squared();
+    if is_beyond_dead_band(expected.now, expected.scatter) && expected.tried.is_none_or(is_worth_it) {
         return act(ActionKind::NewPath, "process_drifted_past_dead_band");
     }
     act(ActionKind::Keep, "process_within_dead_band")
@@ -69,12 +82,12 @@ fn calls_person(
     limits: Limits,
     change: Option<&Change>,
 ) -> Option<&'static str> {
-    let new_path = &forecast.new_path;
+    let best = [&forecast.as_now, &forecast.new_path].into_iter().filter_map(|path| path.in_tolerance_probability);
     let leader = change.and_then(|change| change.causes.first());
     let unnamed = change.filter(|change| change.verdict == ChangeVerdict::Unnamed && !change.accepted);
     let reported: Vec<u32> = memory.changes.iter().rev().take(2).map(|change| change.reported_at_part).collect();
     let is_now = |reported: u32| part.number - reported <= SOON;
-    if new_path.in_tolerance_probability.is_some_and(|probability| probability < LIKELY) {
+    if best.reduce(f64::max).is_some_and(|probability| probability < LIKELY) {
         Some("process_out_of_tolerance_with_any_path")
     } else if unnamed.is_some() && limits.form_um.is_some_and(|form| forecast.as_now.form_um > LARGE * form) {
         Some("process_large_without_a_name")

@@ -148,15 +148,15 @@ fn between_parts<M: Watched>(
         });
     }
     let mut edge = None;
-    let completed: Vec<(usize, Part<M::Run, M::Row>)> =
-        by_number.into_values().map(|index| (index, completed::<M>(document, &parts[index], &mut edge))).collect();
+    let in_order = by_number.into_values().map(|index| (index, completed::<M>(document, &parts[index], &mut edge)));
+    let in_order: Vec<_> = in_order.collect();
     let mut stated: Vec<&'static str> = Vec::new();
-    for (_, part) in &completed {
+    for (_, part) in &in_order {
         let own = M::conditions(&part.conditions);
         stated.extend(own.into_iter().filter(|(_, value)| value.is_some()).map(|(name, _)| name));
     }
     let mut before: Option<(u32, f64)> = None;
-    for (index, part) in &completed {
+    for (index, part) in &in_order {
         for (name, value) in M::conditions(&part.conditions) {
             let cause = M::CAUSES.iter().find(|cause| cause.conditions.contains(&name));
             found.require(value.is_some() || !stated.contains(&name), || {

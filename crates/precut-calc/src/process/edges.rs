@@ -6,7 +6,7 @@ use crate::calculator::Watched;
 /// The edge in use: which, after which part, and the path that it has cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Edge {
-    edge: u32,
+    which: u32,
     number: u32,
     path_m: f64,
 }
@@ -16,9 +16,9 @@ pub(super) struct Edge {
 pub(super) fn completed<M: Watched>(document: &DocumentOf<M>, part: &PartOf<M>, last: &mut Option<Edge>) -> PartOf<M> {
     let follows = last.filter(|before| before.number.checked_add(1) == Some(part.number));
     let by_sum = follows.zip(part.edge).and_then(|(before, edge)| match edge {
-        _ if edge == before.edge => Some(before.path_m),
+        _ if edge == before.which => Some(before.path_m),
         // A new one.
-        _ if edge > before.edge => Some(0.0),
+        _ if edge > before.which => Some(0.0),
         _ => None,
     });
     let path_m = M::path_m(&part.conditions).or(by_sum);
@@ -26,7 +26,7 @@ pub(super) fn completed<M: Watched>(document: &DocumentOf<M>, part: &PartOf<M>, 
     let job = document.part_types.get(&part.part_type).map(|of_type| &of_type.job);
     *last = part.edge.zip(path_m).zip(job).map(|((edge, path_m), job)| {
         let path_m = path_m + M::cut_path_m(job, &own.conditions);
-        Edge { edge, number: part.number, path_m }
+        Edge { which: edge, number: part.number, path_m }
     });
     own
 }

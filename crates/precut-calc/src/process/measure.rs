@@ -60,7 +60,7 @@ pub(super) fn ranked<M: Watched>(
     });
     let telling = M::telling_runs(&job, &last.conditions).into_iter();
     let telling = telling.map(|own| (own.code, own.condition.0, Some(own.condition.1), own.run));
-    for (code, condition, value, run) in usual.chain(telling).collect::<Vec<_>>() {
+    for (code, condition, value, run) in usual.chain(telling) {
         let part = PartOf::<M> { conditions: run, ..last.clone() };
         let Some(gram) = gram_of(watch, &part, monitor)? else { continue };
         let measure = plain(code, watch.memory.apart(&gram, &one, &other));

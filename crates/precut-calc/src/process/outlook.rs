@@ -66,24 +66,46 @@ impl<M: Watched> Watch<M> {
             Some(run) if run != *conditions => self.coming(part_type, &run, monitor)?,
             _ => None,
         };
+        let Some(own) = self.memory.expectation(&sighting) else { return Ok(None) };
+        let scatter = self.memory.scattered(&sighting);
+        let tried = if action::is_beyond_dead_band(&own, &scatter) {
+            self.on_new_path(part_type, conditions, monitor)?
+        } else {
+            None
+        };
         let memory = &self.memory;
-        let expected = |next: &Sighting| memory.with_null(|told, null| memory.expected(next, told, null));
-        let Some(own) = expected(&sighting) else { return Ok(None) };
-        let scatter = memory.scattered(&sighting);
         let per_um = sighting.signs.per_um;
         let as_is = DVector::zeros(own.mean.len());
         let as_now = own.forecast(&as_is, &scatter, per_um, limits);
-        let base_path = match on_base.and_then(|on_base| Some((expected(&on_base.sighting)?, on_base))) {
-            Some((base, on_base)) => base.forecast(&as_is, &memory.scattered(&on_base.sighting), per_um, limits),
-            None => as_now.clone(),
+        let on = |next: &Sighting| {
+            let expected = memory.expectation(next)?;
+            let forecast = expected.forecast(&as_is, &memory.scattered(next), per_um, limits);
+            Some((expected, forecast))
         };
-        let new_path = own.forecast(&own.mean, &scatter, per_um, limits);
+        let base_path = on_base.and_then(|next| on(&next.sighting)).map_or_else(|| as_now.clone(), |(_, own)| own);
+        let (tried, new_path) = tried.and_then(|next| on(&next.sighting)).unzip();
+        let new_path = new_path.unwrap_or_else(|| own.forecast(&own.mean, &scatter, per_um, limits));
         let forecast = Forecast { as_now, new_path, base_path };
-        let action = action::of(memory, &sighting, &own, &scatter, &forecast, limits);
+        let expected = action::Expectation { now: &own, tried: tried.as_ref(), scatter: &scatter };
+        let action = action::of(memory, &sighting, &expected, &forecast, limits);
         let model = memory.model(&sighting);
         let measure_next = measure::ranked(self, &part, monitor)?;
         let (gain, _) = self.gain(monitor)?;
         Ok(Some(Outlook { model, forecast, action, measure_next, gain }))
+    }
+
+    /// The next part on the path that the calculator gives for its job; nothing where it gives none.
+    fn on_new_path(
+        &mut self,
+        part_type: &str,
+        conditions: &M::Run,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Coming<M>>, Failure> {
+        let Some(next) = self.next(part_type, conditions, monitor)? else { return Ok(None) };
+        match M::compensated(&next.job, conditions, monitor)? {
+            Some(run) => self.coming(part_type, &run, monitor),
+            None => Ok(None),
+        }
     }
 
     /// The next part with the rows of the last one of its type; nothing where none came.
@@ -158,7 +180,12 @@ impl Memory {
         if columns.is_empty() { DMatrix::zeros(part.value.len(), 0) } else { DMatrix::from_columns(&columns) }
     }
 
-    /// What the mean deviation of a part that did not come yet may be.
+    /// What the mean deviation of a part that did not come yet may be; nothing while the process is learned.
+    pub(super) fn expectation(&self, part: &Sighting) -> Option<Expected> {
+        self.with_null(|told, null| self.expected(part, told, null))
+    }
+
+    /// The same from what the parts tell.
     pub(super) fn expected(&self, part: &Sighting, told: &[Told<'_>], null: &Null) -> Expected {
         let (rows, number) = (part.value.len(), part.number);
         // The gauge moves readings, not parts.

@@ -66,13 +66,15 @@ pub(crate) struct Shop {
     pub(crate) document: Document,
     pub(crate) random: Resampler,
     pub(crate) template: Part,
+    /// What the last part really was, row by row.
+    pub(crate) truth: Vec<f64>,
 }
 
 impl Shop {
     pub(crate) fn new(seed: u64) -> Self {
         let (mut document, parts) = process(&stream("r10-nothing-300.json"));
         document.options.false_alarm_every_parts = 500;
-        Self { document, random: Resampler::new(seed, 3), template: parts[0].clone() }
+        Self { document, random: Resampler::new(seed, 3), template: parts[0].clone(), truth: Vec::new() }
     }
 
     pub(crate) fn parts(&mut self, count: u32, acting: impl Fn(u32) -> Vec<DeflectionEffect>) -> Vec<Part> {
@@ -94,8 +96,9 @@ impl Shop {
             acting.push(DeflectionEffect::ForceLevel { delta: 0.007 * self.random.normal() });
             let predicted = DeflectionCompensation::predict(&prepared, &acting, &Unwatched).unwrap();
             let mut part = Part { number, ..self.template.clone() };
-            for (row, um) in part.measurements.iter_mut().zip(predicted) {
-                row.diameter_deviation_um = Some(um.unwrap() + setup_um + self.random.normal());
+            self.truth = predicted.into_iter().map(|um| um.unwrap() + setup_um).collect();
+            for (row, um) in part.measurements.iter_mut().zip(&self.truth) {
+                row.diameter_deviation_um = Some(um + self.random.normal());
             }
             part
         };

@@ -152,6 +152,15 @@ impl Rule<'_> {
     }
 }
 
+/// One type of parts over all numbers.
+struct OfType<'a> {
+    rule: Rule<'a>,
+    mean: Vec<DVector<f64>>,
+    /// What one unit of force more does.
+    force: Vec<DVector<f64>>,
+    covariance: Vec<DMatrix<f64>>,
+}
+
 impl Series {
     pub(crate) fn of(recipe: &Recipe, seed: u64) -> Self {
         let (mut document, known) = process(&stream("r03-carriage-two-part-types.json"));
@@ -180,7 +189,7 @@ impl Series {
             let harder = rule.predict(&with(Some(DeflectionEffect::ForceLevel { delta: 1e-3 })));
             let force: Vec<DVector<f64>> = harder.iter().zip(&mean).map(|(a, b)| (a - b) / 1e-3).collect();
             let covariance: Vec<DMatrix<f64>> = force.iter().map(covariance_of).collect();
-            of_types.push((rule, mean, force, covariance));
+            of_types.push(OfType { rule, mean, force, covariance });
         }
         let place = |n: usize| if recipe.two_types { n / 5 % 2 } else { 0 };
         let moved = recipe.change.map(|(hidden, delta, since)| {
@@ -194,32 +203,29 @@ impl Series {
                 Hidden::Warmth => 6.0,
                 _ => 0.0,
             };
-            let shift = |size: f64| -> Vec<Vec<DVector<f64>>> {
-                let of = |(kind, (rule, mean, ..)): (
-                    usize,
-                    &(Rule<'_>, Vec<DVector<f64>>, Vec<DVector<f64>>, Vec<DMatrix<f64>>),
-                )| {
-                    match hidden.effect(base + size) {
-                        Some(effect) => {
-                            rule.predict(&with(Some(effect))).iter().zip(mean).map(|(a, b)| a - b).collect()
-                        }
-                        None => vec![added(kind, size); mean.len()],
+            let shift_of = |kind: usize, own: &OfType<'_>, size: f64| -> Vec<DVector<f64>> {
+                match hidden.effect(base + size) {
+                    Some(effect) => {
+                        own.rule.predict(&with(Some(effect))).iter().zip(&own.mean).map(|(a, b)| a - b).collect()
                     }
-                };
-                of_types.iter().enumerate().map(of).collect()
+                    None => vec![added(kind, size); own.mean.len()],
+                }
+            };
+            let shift = |size: f64| -> Vec<Vec<DVector<f64>>> {
+                of_types.iter().enumerate().map(|(kind, own)| shift_of(kind, own, size)).collect()
             };
             // Its size: so many standard deviations of a part, root mean square over the parts since.
             let unit = shift(hidden.unit());
             let after = since as usize - 1..recipe.count as usize;
             let square = |n: usize| {
                 let own = &unit[place(n)][n];
-                own.dot(&of_types[place(n)].3[n].clone().cholesky().unwrap().solve(own))
+                own.dot(&of_types[place(n)].covariance[n].clone().cholesky().unwrap().solve(own))
             };
             let length = (after.clone().map(square).sum::<f64>() / after.len() as f64).sqrt();
             (shift(sign * delta / length * hidden.unit()), since)
         });
         let parts = (0..recipe.count as usize).map(|n| {
-            let (_, mean, force, _) = &of_types[place(n)];
+            let OfType { mean, force, .. } = &of_types[place(n)];
             let (setup, by_force) = (SETUP_UM * random.normal(), FORCE * random.normal());
             let mut part = templates[place(n)].clone();
             part.number = u32::try_from(n).unwrap() + 1;
@@ -236,8 +242,8 @@ impl Series {
         });
         let parts = parts.collect();
         let all = 0..recipe.count as usize;
-        let mean = all.clone().map(|n| of_types[place(n)].1[n].clone()).collect();
-        let covariance = all.map(|n| of_types[place(n)].3[n].clone()).collect();
+        let mean = all.clone().map(|n| of_types[place(n)].mean[n].clone()).collect();
+        let covariance = all.map(|n| of_types[place(n)].covariance[n].clone()).collect();
         Self { document, parts, mean, covariance }
     }
 }
