@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use axum::http::Method;
 use clap::{Args, Subcommand};
+use hyper::Method;
 use precut_calc::calculator::Unwatched;
 use precut_calc::process::{Outlook, State};
 use serde_json::{Value, json};
