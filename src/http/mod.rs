@@ -153,7 +153,7 @@ pub async fn answer_to(app: &App, request: Request<Bytes>) -> (StatusCode, Bytes
     let Ok(response) = router(app).oneshot(request.map(Body::from)).await;
     let status = response.status();
     // What is made in memory has no end that fails.
-    let body = response.into_body().collect().await.map(|body| body.to_bytes()).unwrap_or_default();
+    let body = response.into_body().collect().await.map(http_body_util::Collected::to_bytes).unwrap_or_default();
     (status, body)
 }
 
