@@ -4,14 +4,13 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use axum::body::Body;
-use axum::http::header::{ACCEPT, ACCEPT_LANGUAGE, AUTHORIZATION, CONTENT_TYPE, HOST, IF_MATCH};
-use axum::http::{Method, Request, StatusCode};
+use bytes::Bytes;
 use clap::Args;
-use http_body_util::BodyExt;
+use http_body_util::{BodyExt, Full};
+use hyper::header::{ACCEPT, ACCEPT_LANGUAGE, AUTHORIZATION, CONTENT_TYPE, HOST, IF_MATCH};
+use hyper::{Method, Request, StatusCode};
 use hyper_util::rt::TokioIo;
 use tokio::net::TcpStream;
-use tower::ServiceExt;
 
 use super::Failed;
 use crate::config::{Config, Flags};
@@ -87,7 +86,6 @@ impl Asker {
 
     /// The bytes of an answer.
     pub(super) async fn ask(&self, question: Question) -> Result<Vec<u8>, Failed> {
-        let failed = |reason: String| Failed::Machine(reason);
         let (base, host) = match &self.to {
             To::Here(..) => ("", "localhost"),
             To::There { authority, base } => (base.as_str(), authority.as_str()),
@@ -107,20 +105,16 @@ impl Asker {
         let body = match question.body {
             Some((kind, bytes)) => {
                 request = request.header(CONTENT_TYPE, kind);
-                Body::from(bytes)
+                Bytes::from(bytes)
             }
-            None => Body::empty(),
+            None => Bytes::new(),
         };
-        let request = request.body(body).map_err(|error| failed(error.to_string()))?;
+        let request = request.body(body).map_err(|error| Failed::Machine(error.to_string()))?;
         let (status, bytes) = match &self.to {
-            To::Here(app, _) => {
-                let Ok(response) = http::router(app).oneshot(request).await;
-                let status = response.status();
-                (status, collected(response.into_body()).await?)
-            }
+            To::Here(app, _) => http::answer_to(app, request).await,
             To::There { authority, .. } => there(authority, request).await?,
         };
-        if status.is_success() { Ok(bytes) } else { Err(refused(status, &bytes)) }
+        if status.is_success() { Ok(bytes.to_vec()) } else { Err(refused(status, &bytes)) }
     }
 
     /// Writes what waits to be written.
@@ -131,21 +125,17 @@ impl Asker {
     }
 }
 
-async fn there(authority: &str, request: Request<Body>) -> Result<(StatusCode, Vec<u8>), Failed> {
+async fn there(authority: &str, request: Request<Bytes>) -> Result<(StatusCode, Bytes), Failed> {
     let failed = |reason: String| Failed::Machine(format!("{authority} does not answer: {reason}"));
     let address = if authority.contains(':') { authority.to_owned() } else { format!("{authority}:80") };
     let stream = TcpStream::connect(address).await.map_err(|error| failed(error.to_string()))?;
     let connected = hyper::client::conn::http1::handshake(TokioIo::new(stream)).await;
     let (mut sender, connection) = connected.map_err(|error| failed(error.to_string()))?;
     tokio::spawn(connection);
-    let response = sender.send_request(request).await.map_err(|error| failed(error.to_string()))?;
+    let response = sender.send_request(request.map(Full::new)).await.map_err(|error| failed(error.to_string()))?;
     let status = response.status();
-    Ok((status, collected(Body::new(response.into_body())).await?))
-}
-
-async fn collected(body: Body) -> Result<Vec<u8>, Failed> {
-    let bytes = body.collect().await.map_err(|error| Failed::Machine(error.to_string()))?;
-    Ok(bytes.to_bytes().to_vec())
+    let body = response.into_body().collect().await.map_err(|error| failed(error.to_string()))?;
+    Ok((status, body.to_bytes()))
 }
 
 /// A problem document, as the service wrote it.

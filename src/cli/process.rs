@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use axum::http::Method;
 use clap::{Args, Subcommand};
+use hyper::Method;
 use precut_calc::calculator::Unwatched;
 use precut_calc::process::{Outlook, State};
 use serde_json::{Value, json};
@@ -171,8 +171,9 @@ fn report(add: &AddArgs) -> Result<Question, Failed> {
     let is_csv = add.file.extension().is_some_and(|end| end.eq_ignore_ascii_case("csv"));
     if is_csv {
         let number = add.number.ok_or_else(|| Failed::Usage("measured rows alone need --number".to_owned()))?;
-        let conditions: String = add.condition.iter().map(|condition| format!("&{condition}")).collect();
-        let path = format!("{path}?number={number}&part_type={}{conditions}", add.part_type);
+        let mut query = vec![format!("number={number}"), format!("part_type={}", add.part_type)];
+        query.extend(add.condition.iter().cloned());
+        let path = format!("{path}?{}", query.join("&"));
         return Ok(Question { method: Method::PUT, body: Some(("text/csv", bytes)), if_match, ..Question::get(path) });
     }
     let mut sent: Value = serde_json::from_slice(&bytes).map_err(|error| job::no_json(&error))?;

@@ -38,9 +38,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use axum::Router;
-use axum::extract::{Path, Request};
-use axum::http::{HeaderName, Uri};
+use axum::body::Body;
+use axum::extract::Path;
+use axum::http::{HeaderName, Request, StatusCode, Uri};
 use axum::routing::{any, get, post};
+use bytes::Bytes;
+use http_body_util::BodyExt;
+use tower::ServiceExt;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
 use precut_library::Kind;
@@ -144,6 +148,15 @@ pub fn router(app: &App) -> Router {
     if app.role == Role::Worker { admin_router(app) } else { gated(app, routes(app, health())) }
 }
 
+/// The answer to one request, without a connection: for who has the service in the same program.
+pub async fn answer_to(app: &App, request: Request<Bytes>) -> (StatusCode, Bytes) {
+    let Ok(response) = router(app).oneshot(request.map(Body::from)).await;
+    let status = response.status();
+    // What is made in memory has no end that fails.
+    let body = response.into_body().collect().await.map(http_body_util::Collected::to_bytes).unwrap_or_default();
+    (status, body)
+}
+
 /// Health and metrics alone, behind the same gate.
 fn admin_router(app: &App) -> Router {
     gated(app, health())
@@ -203,7 +216,7 @@ fn routes(app: &App, health: Router<App>) -> Router<App> {
     for room in &app.rooms {
         let handler = {
             let (app, room) = (app.clone(), room.clone());
-            move |request: Request| calculators::solve(app.clone(), room.clone(), request)
+            move |request: Request<Body>| calculators::solve(app.clone(), room.clone(), request)
         };
         router = router.route(&format!("/v1/{}", room.id()), post(handler));
     }

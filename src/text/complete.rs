@@ -98,6 +98,8 @@ const LATIN: &[&str] = &[
     "quadratic",
     "from",
     "holder",
+    "ETag",
+    "If-Match",
     "If-None-Match",
     "insert",
     "normal_force",

@@ -168,7 +168,7 @@ fn the_keyboard_alone_is_enough() {
     page.until("document.activeElement.classList.contains('skip')");
     // Through the shell into the form, in the order in which it is read.
     let mut seen = Vec::new();
-    for _ in 0..20 {
+    for _ in 0..21 {
         page.press("Tab");
         let name = page.evaluate(
             "(() => { const it = document.activeElement; return (it.id || it.textContent).trim().slice(0, 40) })()",

@@ -27,6 +27,16 @@ fn declared() -> Value {
     process
 }
 
+/// The same with every number written in one way.
+fn plain(value: &Value) -> Value {
+    match value {
+        Value::Number(number) => json!(number.as_f64()),
+        Value::Array(items) => items.iter().map(plain).collect(),
+        Value::Object(fields) => fields.iter().map(|(name, part)| (name.clone(), plain(part))).collect(),
+        other => other.clone(),
+    }
+}
+
 /// The part of a number.
 fn part(number: usize) -> Value {
     stream()["parts"][number - 1].clone()
@@ -93,14 +103,14 @@ async fn the_tailstock_that_softened_at_part_37_is_told_part_by_part() {
     let process = got(&server, "/v1/processes/shaft-560").await;
     assert_eq!(process["state"]["changes"][0]["since_part"], 37);
     assert_eq!(process["state"]["changes"][0]["causes"][0]["kind"], "tailstock_compliance");
-    assert_eq!(process["document"], declared());
+    assert_eq!(plain(&process["document"]), plain(&declared()));
     let state = got(&server, "/v1/processes/shaft-560/state").await;
     assert_eq!(state, process["state"]);
     assert_eq!(got(&server, "/v1/processes/shaft-560/changes").await["items"], state["changes"]);
     // What was said when a part came stays as it was said.
     let kept = got(&server, "/v1/processes/shaft-560/parts/p-37").await;
     assert_eq!((&kept["said"]["number"], &kept["revision"]), (&json!(37), &json!(1)));
-    assert_eq!(kept["sent"], part(37));
+    assert_eq!(plain(&kept["sent"]), plain(&part(37)));
     let russian = server.get("/v1/processes/shaft-560/state").header("accept-language", "ru").send().await.unwrap();
     assert_eq!(header(&russian, "content-language"), "ru");
     let russian: Value = russian.json().await.unwrap();
@@ -148,7 +158,8 @@ async fn a_part_is_taken_once_and_corrected_by_who_has_seen_it() {
     // It stays on record.
     let kept = got(&server, path).await;
     let kinds: Vec<&Value> = kept["history"].as_array().unwrap().iter().map(|entry| &entry["kind"]).collect();
-    assert_eq!((kept["withdrawn"].clone(), kinds), (json!(true), vec!["part", "part", "withdrawn"]));
+    assert_eq!(kinds, ["part", "part", "withdrawn"]);
+    assert_eq!(kept["withdrawn"], true);
     let log = got(&server, "/v1/processes/shaft-560/history?limit=3").await;
     assert_eq!(log["items"].as_array().unwrap().len(), 3);
     let rest = got(&server, log["next"].as_str().unwrap()).await;
@@ -386,7 +397,7 @@ async fn a_whole_record_goes_out_and_in() {
         copied[field] = own[field].clone();
     }
     assert_eq!(copied, own);
-    assert_eq!(got(&server, "/v1/processes/copy/export").await["record"], record["record"]);
+    assert_eq!(got(&server, "/v1/processes/copy/export").await["sha256"], record["sha256"]);
     server.stop().await;
 }
 

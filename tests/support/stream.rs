@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 /// A stream of the compute crate's tests as a process file.
-pub fn process_file(name: &str) -> Value {
+pub(crate) fn process_file(name: &str) -> Value {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/crates/precut-calc/tests/reference/process/");
     let stream: Value = serde_json::from_str(&std::fs::read_to_string(format!("{folder}{name}")).unwrap()).unwrap();
     let jobs = stream["jobs"].as_object().unwrap();

@@ -153,8 +153,7 @@ pub(super) struct Issued {
 pub(super) fn for_calculator(content: &Value, paths: &[Issued], is_new: bool) -> Result<Value, Finding> {
     let mut part = content.clone();
     lift(&mut part);
-    let fields = part.as_object_mut().into_iter();
-    let path = fields.filter_map(|fields| fields.remove("path")).next().unwrap_or_default();
+    let path = part.as_object_mut().and_then(|fields| fields.remove("path")).unwrap_or_default();
     if part.get("conditions").is_none_or(Value::is_null) {
         part["conditions"] = json!({});
     }

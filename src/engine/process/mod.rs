@@ -221,7 +221,7 @@ impl Engine {
                 Err(error) => return Err(error),
             };
             if let Some(there) = &there {
-                if there.document == sent {
+                if canonical_text(&there.document)? == canonical_text(&sent)? {
                     return Ok((there.clone(), false));
                 }
                 precondition.hold(&there.tag())?;

@@ -118,7 +118,7 @@ impl Engine {
             if known.is_some() || !asked.issue {
                 return Ok(next);
             }
-            let result: Value = serde_json::from_slice(&next.solved.stored.body).map_err(unreadable)?;
+            let result: Value = serde_json::from_slice(&next.solved.stored.body).map_err(|error| unreadable(&error))?;
             let Some(conditions) = (observed.commanded)(result["result"].clone()) else {
                 // Whoever asks for the program is told what is wrong with the path.
                 return Ok(next);
@@ -153,7 +153,7 @@ impl Engine {
     }
 }
 
-fn unreadable(error: serde_json::Error) -> Error {
+fn unreadable(error: &serde_json::Error) -> Error {
     Error::internal(format!("a result: {error}"))
 }
 
@@ -210,18 +210,13 @@ fn with_changes(entry: &Entry, mut job: Value, state: &State) -> Value {
             continue;
         }
         let mut with = effects.clone();
-        let there = with.iter_mut().find(|effect| effect["kind"] == cause.kind.as_str());
-        match there {
-            Some(effect) => {
-                let held = effect[cause.parameter].as_f64().unwrap_or(0.0);
-                effect[cause.parameter] = json!(held + acts * cause.delta);
-            }
-            None => {
-                let mut effect = Map::new();
-                effect.insert("kind".to_owned(), json!(cause.kind));
-                effect.insert(cause.parameter.to_owned(), json!(acts * cause.delta));
-                with.push(effect.into());
-            }
+        if let Some(effect) = with.iter_mut().find(|effect| effect["kind"] == cause.kind.as_str()) {
+            let held = effect[cause.parameter].as_f64().unwrap_or(0.0);
+            effect[cause.parameter] = json!(held + acts * cause.delta);
+        } else {
+            let size = (cause.parameter.to_owned(), json!(acts * cause.delta));
+            let effect: Map<String, Value> = [("kind".to_owned(), json!(cause.kind)), size].into_iter().collect();
+            with.push(effect.into());
         }
         let mut faults = Faults::default();
         entry.validate_effects(&json!(with), &mut faults);

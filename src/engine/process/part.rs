@@ -82,13 +82,11 @@ impl Engine {
         for _ in 0..TRIES {
             inner.head(shelf, process).await?;
             let live = Live::current(inner, &full, &mut seated).await?;
-            let content = match &read_as {
-                Some(content) => content.clone(),
-                None => {
-                    let observed = live.document.observed(&inner.registry)?;
-                    read_as.insert(body::part(observed, sent.clone(), tables)?).clone()
-                }
-            };
+            if read_as.is_none() {
+                let observed = live.document.observed(&inner.registry)?;
+                read_as = Some(body::part(observed, sent.clone(), tables)?);
+            }
+            let content = read_as.clone().unwrap_or_default();
             let text = canonical_text(&content)?;
             let there = inner.processes.process_part(full.clone(), part.to_owned()).await?;
             if let Some(there) = there.as_ref().filter(|there| there.number.is_some()) {

@@ -17,8 +17,7 @@ pub(super) fn state(
     let texts = Texts::shared();
     let english = Language::default();
     let mut said = json!(state);
-    let fields = said.as_object_mut().into_iter();
-    let last = fields.filter_map(|fields| fields.remove("number")).next().unwrap_or_default();
+    let last = said.as_object_mut().and_then(|fields| fields.remove("number")).unwrap_or_default();
     let remarks: Vec<_> = state.explanation.iter().map(|message| texts.remark(english, message)).collect();
     said["explanation"] = json!(remarks);
     said["process"] = json!(name);

@@ -52,18 +52,17 @@ pub(super) async fn state(
         response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(Media::Svg.content_type()));
         return Ok(response);
     }
-    let text = match table {
-        Some("changes") => changes(process.state.as_ref()),
-        _ => {
-            let (mut text, mut from) = (HEADER.to_owned(), 0);
-            loop {
-                let page = app.engine.process_parts(&caller.shelf(), &name, (from, i64::MAX), PAGE).await?;
-                let Some(last) = page.last().and_then(|part| part.number) else { break };
-                from = last + 1;
-                page.iter().for_each(|part| text.push_str(&row(part)));
-            }
-            text
+    let text = if table == Some("changes") {
+        changes(process.state.as_ref())
+    } else {
+        let (mut text, mut from) = (HEADER.to_owned(), 0);
+        loop {
+            let page = app.engine.process_parts(&caller.shelf(), &name, (from, i64::MAX), PAGE).await?;
+            let Some(last) = page.last().and_then(|part| part.number) else { break };
+            from = last + 1;
+            text.extend(page.iter().map(row));
         }
+        text
     };
     let mut response = Response::new(text.into());
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/csv; charset=utf-8"));
