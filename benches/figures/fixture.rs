@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix4};
 use precut_calc::calculator::{Calculator, Unwatched};
+use precut_calc::clamping::{Asked, Load, Vise};
 use precut_calc::fixture_stability::identification::{FixtureIdentification, IdentificationJob};
 use precut_calc::fixture_stability::{
     FixtureJob, FixtureStability, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time,
@@ -202,4 +203,34 @@ fn textbook_radius(immersion: f64, rpm: f64, depth: f64) -> f64 {
         total = map * total;
     }
     total.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+}
+
+/// A vise with parallels under the loads of a turn: the force by which nothing slips, and below which slip is certain.
+pub(crate) fn clamping(loads: u32) -> Result<Measured, String> {
+    let vise = Vise {
+        jaw_length_mm: 100.0,
+        jaw_height_mm: 30.0,
+        part_width_mm: 60.0,
+        parallels: true,
+        friction: 0.2,
+        constant_force: true,
+        weight_n: 15.0,
+        centre_of_mass_mm: [0.0, 0.0, 25.0],
+    };
+    let fixture = vise.fixture();
+    let friction: Vec<f64> = fixture.contacts.iter().map(|contact| contact.friction).collect();
+    let load = |i: u32| {
+        let (s, c) = (f64::from(i) / f64::from(loads) * std::f64::consts::TAU).sin_cos();
+        Load { force_n: [300.0 + 400.0 * c, 200.0 + 400.0 * s, 100.0 * s], point_mm: [20.0 * c, 5.0, 40.0] }
+    };
+    let loads: Vec<Load> = (0..loads).map(load).collect();
+    let asked = Asked {
+        fixture: &fixture,
+        peaks: &loads,
+        means: &[],
+        safety: 1.0,
+        friction: [&friction; 3],
+        clamp_force_n: None,
+    };
+    cpu_time(|| asked.sheet())
 }

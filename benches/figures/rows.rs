@@ -90,6 +90,16 @@ pub(crate) fn all() -> Vec<Row> {
             fitting::machinability(0)
         }),
         row("the same with 1000 resamples", Unit::Time, None, None, || fitting::machinability(1000)),
+        row(
+            "receptance fit, 4000 lines, two modes, with refinement and errors",
+            Unit::Time,
+            us(20_000.0),
+            us(6000.0),
+            || fitting::receptance(4000),
+        ),
+        row("clamping, 12 contacts, 120 loads, no slip and certain slip", Unit::Time, us(20_000.0), us(4000.0), || {
+            fixture::clamping(120)
+        }),
         row("lobe map 200 x 100 converged, one mode, full slot", Unit::Time, us(400_000.0), us(120_000.0), || {
             fixture::map(1.0)
         }),

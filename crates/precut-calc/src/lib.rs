@@ -21,6 +21,7 @@ pub mod num;
 pub mod path;
 pub mod process;
 pub mod program_compensation;
+pub mod receptance_fit;
 pub mod ring_clamping;
 pub mod ring_roundness;
 pub mod shaft;
@@ -41,5 +42,6 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.diagnosable::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
     registrar.calculator::<compliance_fit::ComplianceFit>();
+    registrar.calculator::<receptance_fit::ReceptanceFit>();
     registrar.calculator::<program_compensation::ProgramCompensation>();
 }

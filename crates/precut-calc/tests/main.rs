@@ -96,6 +96,7 @@ mod program_correction;
 mod program_reading;
 mod program_stock;
 mod program_yielding;
+mod receptance_fit;
 mod ring_cases;
 mod ring_clamping;
 mod ring_contract;
