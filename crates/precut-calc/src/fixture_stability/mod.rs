@@ -55,6 +55,11 @@ pub use output::{
     TextbookForce, VibrationMode, ZerothOrder,
 };
 
+pub(crate) use check::check_characteristic;
+pub(crate) use cutting::engagement_rad;
+pub(crate) use drive::power_kw;
+pub(crate) use plausible::{COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
+
 pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
 
 use crate::calculator::{
