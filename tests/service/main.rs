@@ -27,6 +27,7 @@ mod jobs;
 mod language;
 mod library;
 mod limits;
+mod milling;
 mod models;
 mod negotiation;
 mod owners;

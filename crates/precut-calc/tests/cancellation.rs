@@ -267,6 +267,12 @@ fn dear(calculator: &str) -> Vec<Value> {
             json!({"cut": {"spindle_speed_rpm": 20}, "analyses": ["lobes"],
                    "lobes": {"from_rpm": 5, "to_rpm": 40, "speeds": 400, "depths": 50, "map": true}}),
         ],
+        "milling-stability" => vec![
+            json!({"cut": {"spindle_speed_rpm": 25}, "analyses": ["intervals"]}),
+            json!({"cut": {"spindle_speed_rpm": 25}, "analyses": ["motion", "proposals"]}),
+            json!({"cutter": {"teeth": 12, "helix_angle_deg": 40, "radial_offset_um": [0, 9, 1, 5, 3, 7, 2, 8, 4, 6, 5, 1]}}),
+            json!({"speed_variation": {"amplitude": 0.2, "frequency_hz": 15.833}, "analyses": ["lobes", "speeds"]}),
+        ],
         "ring-roundness" => vec![
             json!({"samples": 200_000, "tool": {"revolutions": 1000}}),
             json!({"analyses": ["setup_map"], "setup_map": {"tool_angles": 100, "support_angles": 100}}),

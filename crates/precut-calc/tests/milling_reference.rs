@@ -7,8 +7,8 @@ use std::path::Path;
 
 use precut_calc::calculator::Unwatched;
 use precut_calc::milling_stability::model::{
-    Cut, Kind, Law, Milling, Mode, Orders, Rotation, Rubbing, Side, Structure, Tooth, crossings, mean_stiffness,
-    unstable, zeroth,
+    Cut, Kind, Law, Milling, Mode, Orders, Rotation, Rubbing, Search, Side, Structure, Tooth, Wall, mean_stiffness,
+    scan, statics, unstable, zeroth,
 };
 use serde_json::Value;
 
@@ -145,7 +145,8 @@ fn boundaries_are_those_of_the_reference() {
         let (milling, structure) = (milling(input), structure(input));
         let cut = Cut { milling: &milling, structure: &structure, rotation: rotation(input, &milling), depth_mm: 1.0 };
         let deepest = case["scan"].as_array().unwrap().last().unwrap().as_f64().unwrap();
-        let found = crossings(&orders, &cut, deepest, 24, &Unwatched).unwrap();
+        let search = Search { depth_max_mm: deepest, steps: 24, only_first: false, on_map: false };
+        let found = scan(&orders, &cut, &search, &Unwatched).unwrap().crossings;
         let expected = case["expected"]["crossings"].as_array().unwrap();
         assert_eq!(found.len(), expected.len(), "{id}: {found:?}");
         for (found, expected) in found.iter().zip(expected) {
@@ -175,6 +176,47 @@ fn the_zeroth_order_is_that_of_the_reference() {
         for k in 0..9 {
             let off = (mean[k / 3][k % 3] - given(k / 3, k % 3)).abs();
             assert!(off < 1e-10 * largest, "{id}: {mean:?}");
+        }
+    }
+}
+
+/// Extremes of the forced motion and the error of the wall to 1e-6 of the swing, mean force to round-off.
+#[test]
+fn forced_motions_are_those_of_the_reference() {
+    let orders = Orders::default();
+    for case in cases("motion.json") {
+        let (id, input, expected) = (&case["id"], &case["input"], &case["expected"]);
+        let (milling, structure) = (milling(input), structure(input));
+        let depth_mm = number(&input["cut"], "depth_mm");
+        let cut = Cut { milling: &milling, structure: &structure, rotation: rotation(input, &milling), depth_mm };
+        let forced = orders.forced(&cut, &Unwatched).unwrap().unwrap();
+        let (low, high) = forced.extremes();
+        for (q, name) in ["x", "y", "z"].iter().enumerate() {
+            let given = ["min", "max"].map(|end| number(expected, &format!("{name}_{end}_um")));
+            let swing = given[1] - given[0];
+            for (found, given) in [low[q], high[q]].iter().zip(given) {
+                assert!((1e3 * found - given).abs() <= 1e-6 * swing, "{id} {name}: {} for {given}", 1e3 * found);
+            }
+        }
+        let force = statics(&milling, depth_mm);
+        for q in 0..3 {
+            let given = expected["mean_force_n"][q].as_f64().unwrap();
+            assert!((force.mean_n[q] - given).abs() < 1e-9 * 1e3, "{id}: {:?}", force.mean_n);
+        }
+        let swing = number(expected, "y_max_um") - number(expected, "y_min_um");
+        let walls = forced.walls();
+        assert_eq!(walls.len(), usize::from(expected["sle_um"].is_array()), "{id}");
+        for wall in walls {
+            assert_eq!(wall == Wall::Up, number(&input["cut"], "entry_deg") < 1.0, "{id}");
+            for (k, height) in expected["heights_mm"].as_array().unwrap().iter().enumerate() {
+                let found = 1e3 * forced.surface_error_mm(wall, height.as_f64().unwrap());
+                let given = expected["sle_um"][k].as_f64().unwrap();
+                assert!((found - given).abs() < 1e-6 * swing, "{id} at {height}: {found} for {given}");
+            }
+            // Teeth that are alike leave arcs one feed apart.
+            let feed = milling.feed_mm;
+            let rz = forced.roughness(wall, 0.0).rz_mm;
+            assert!((rz / (feed * feed / (8.0 * milling.radius_mm)) - 1.0).abs() < 1e-4, "{id}: {rz}");
         }
     }
 }

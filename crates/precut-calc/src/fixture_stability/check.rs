@@ -5,7 +5,7 @@ use crate::effects::FixtureEffect as Effect;
 
 use super::acting::Case;
 use super::cutting::engagement_rad;
-use super::input::{FixtureJob, Friction, MAX_MAP_POINTS, Vise};
+use super::input::{FixtureJob, Friction, MAX_MAP_POINTS, SpindlePoint, Vise};
 use super::uncertain;
 
 /// Codes of the faults found here, and those that fields name for their range.
@@ -96,12 +96,17 @@ fn check_spindle(job: &FixtureJob, violations: &mut Violations) {
     let Some(spindle) = &job.spindle else { return };
     let limits = spindle.power_kw.is_some() || spindle.torque_n_m.is_some() || !spindle.characteristic.is_empty();
     violations.require(limits, || Finding::new("spindle_without_limit", "/spindle"));
-    for (i, row) in spindle.characteristic.iter().enumerate() {
+    check_characteristic(&spindle.characteristic, violations);
+}
+
+/// Rows of a spindle: each states a limit, by rising speed.
+pub(crate) fn check_characteristic(rows: &[SpindlePoint], violations: &mut Violations) {
+    for (i, row) in rows.iter().enumerate() {
         violations.require(row.power_kw.is_some() || row.torque_n_m.is_some(), || {
             Finding::new("spindle_row_without_limit", format!("/spindle/characteristic/{i}"))
         });
     }
-    for (i, pair) in spindle.characteristic.windows(2).enumerate() {
+    for (i, pair) in rows.windows(2).enumerate() {
         let (before, here) = (pair[0].spindle_speed_rpm, pair[1].spindle_speed_rpm);
         violations.require(before < here, || {
             Finding::new("spindle_speeds_unordered", format!("/spindle/characteristic/{}/spindle_speed_rpm", i + 1))

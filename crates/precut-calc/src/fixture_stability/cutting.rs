@@ -51,7 +51,7 @@ impl Stretch {
 }
 
 /// Entry and exit angle of a strip from `offset - width/2` to `offset + width/2` (`fixture/2.1`); `None` when it misses the cutter.
-pub(super) fn engagement_rad(radius_mm: f64, width_mm: f64, offset_mm: f64) -> Option<(f64, f64)> {
+pub(crate) fn engagement_rad(radius_mm: f64, width_mm: f64, offset_mm: f64) -> Option<(f64, f64)> {
     let entry = ((offset_mm + 0.5 * width_mm) / radius_mm).min(1.0);
     let exit = ((offset_mm - 0.5 * width_mm) / radius_mm).max(-1.0);
     let (entry_rad, exit_rad) = (entry.max(-1.0).acos(), exit.min(1.0).acos());

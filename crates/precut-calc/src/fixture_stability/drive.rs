@@ -18,7 +18,7 @@ const W_PER_KW: f64 = 1000.0;
 
 /// What a spindle gives at a speed; `None` where nothing is said of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Available {
+pub(crate) struct Available {
     /// Power of the motor, kW.
     pub power_kw: Option<f64>,
     /// Torque at the cutter, N m.
@@ -44,7 +44,7 @@ impl DriveDepths {
 
 impl Spindle {
     /// What it gives at a speed: the least of what is stated for all speeds and of the table there.
-    pub(super) fn available(&self, spindle_rpm: f64) -> Available {
+    pub(crate) fn available(&self, spindle_rpm: f64) -> Available {
         let least = |constant: Option<f64>, of: fn(&SpindlePoint) -> Option<f64>| match self.in_table(spindle_rpm, of) {
             Some(tabled) => Some(constant.map_or(tabled, |constant| constant.min(tabled))),
             None => constant,
@@ -69,7 +69,7 @@ impl Spindle {
     }
 
     /// Range of speeds of its table, where it has one.
-    pub(super) fn tabled_rpm(&self) -> Option<(f64, f64)> {
+    pub(crate) fn tabled_rpm(&self) -> Option<(f64, f64)> {
         Some((self.characteristic.first()?.spindle_speed_rpm, self.characteristic.last()?.spindle_speed_rpm))
     }
 }
@@ -99,7 +99,7 @@ fn sine_over_arc(power: f64, from_rad: f64, to_rad: f64) -> f64 {
 }
 
 /// Power at the cutter, kW.
-pub(super) fn power_kw(torque_n_m: f64, spindle_rpm: f64) -> f64 {
+pub(crate) fn power_kw(torque_n_m: f64, spindle_rpm: f64) -> f64 {
     torque_n_m * TAU * spindle_rpm / (60.0 * W_PER_KW)
 }
 

@@ -1,3 +1,269 @@
-//! Milling in three directions: how deep may this cutter go before it chatters?
+//! Milling in three directions: how deep may this cutter go at this speed before it chatters, what limits, and what does the
+//! cut do to tool, work and surface?
+//!
+//! The way of a job: `job` (fields, rules, numbers in the axes of the cut) -> `model` (chips, edges, the map over a period,
+//! forced motion) -> `answer` (numbers, pictures, what is said).
 
+mod answer;
+mod job;
 pub mod model;
+
+pub use answer::output::{
+    CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind, LeadingMultiplier, LobeIntervals,
+    MillingBoundary, MillingCost, MillingEngagement, MillingForces, MillingLobes, MillingMap, MillingMotion,
+    MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, PocketLimit, ProposalKind, RigidLimits,
+    SpeedCurve, SpeedPocket, SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
+};
+pub use job::{
+    Asked, Cut, CutLimits, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
+    MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,
+    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingVise,
+};
+
+use crate::calculator::{
+    Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
+    Place, Table, checkpoint,
+};
+
+use answer::{Study, advice, outcome, picture};
+use job::{Case, N_MOST, range_rpm};
+
+/// The calculator.
+#[derive(Debug, Clone, Copy)]
+pub struct MillingStability;
+
+impl Calculator for MillingStability {
+    type Input = Job;
+    type Output = Outcome;
+
+    const META: Meta = Meta {
+        id: "milling-stability",
+        kind: CalculatorKind::Calculator,
+        version: 1,
+        title: "Milling in three directions",
+        question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
+        summary: "Tool and workpiece yield by modes in any direction; edges may be helical, pitches, helices and run-out \
+                  uneven, and the spindle speed may vary. From that: the Floquet multiplier with its frequencies, every \
+                  stretch of depths that is unstable with certified ends, the lobe diagram with its islands, which side and \
+                  direction limits (solved with each held rigid), forces, torque and power, the forced motion and the \
+                  surface that it leaves.",
+        references: &[
+            "Altintas, Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362",
+            "Insperger, Stepan, Updated semi-discretization method for periodic delay-differential equations with discrete delay, Int. J. Numer. Meth. Engng 61 (2004) 117-141",
+            "Zatarain, Munoa, Peigne, Insperger, Analysis of the influence of mill helix angle on chatter stability, CIRP Annals 55 (2006) 365-368",
+        ],
+        examples: &[
+            Example {
+                id: "two_modes",
+                title: "End mill with two modes in each direction: at 9500 rev/min 1.5 mm chatter",
+                job: include_str!("examples/two_modes.json"),
+            },
+            Example {
+                id: "island",
+                title: "One helical tooth at full speed: between 6.9 and 17.8 mm it chatters, above and below not",
+                job: include_str!("examples/island.json"),
+            },
+            Example {
+                id: "wall",
+                title: "Tool and thin work yield: which of both limits, and what wall is left",
+                job: include_str!("examples/wall.json"),
+            },
+        ],
+        hallmarks: &[
+            Hallmark::Of("/cutter/diameter_mm"),
+            Hallmark::Of("/cutter/teeth"),
+            Hallmark::Of("/cut/depth_mm"),
+            Hallmark::Of("/cut/spindle_speed_rpm"),
+            Hallmark::Of("/cut/feed_mm_per_tooth"),
+            Hallmark::Count("/tool/modes"),
+            Hallmark::Count("/work/modes"),
+        ],
+        study_outputs: &[
+            "/first_limit_mm",
+            "/multiplier/per_tooth",
+            "/force/motor_power_kw",
+            "/motion/peak_to_peak_um",
+        ],
+        codes: CODES,
+        figures: picture::FIGURE_IDS,
+        tables: picture::TABLE_IDS,
+        has_program: false,
+    };
+
+    fn fill(job: &mut Job) {
+        let (spindle, feed) = (job.spindle_rpm(), job.feed_mm());
+        if spindle.is_some() {
+            (job.cut.spindle_speed_rpm, job.cut.speed_m_per_min) = (spindle, None);
+        }
+        if feed.is_some() {
+            (job.cut.feed_mm_per_tooth, job.cut.feed_mm_per_min) = (feed, None);
+        }
+        job.analyses.sort_unstable();
+        job.analyses.dedup();
+    }
+
+    fn cost(job: &Job) -> Cost {
+        cost(job)
+    }
+
+    fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
+        checkpoint(monitor)?;
+        let case = Case::of(job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
+        let study = Study::new(job, case, monitor);
+        let (outcome, aside) = outcome(&study, cost(job).ms)?;
+        let warnings = advice::warnings(&study, &outcome, &aside);
+        let explanation = advice::explanation(&study, &outcome);
+        monitor.progress(1.0, Message::new("stage_done"));
+        Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+    }
+
+    fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+        picture::figures(job, outcome)
+    }
+
+    fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
+        picture::tables(outcome)
+    }
+
+    fn at_place(job: &Job, _outcome: &Outcome, place: &Place<'_>) -> Option<Job> {
+        picture::at_place(job, place)
+    }
+}
+
+/// A multiplier: of an element whose force acts in two directions, ms; its Krylov spaces grow with the oscillations of a period, and
+/// from some hundreds on they are restarted. Measured with 1 to 2000 oscillations.
+const ELEMENT_MS: f64 = 0.03;
+const SPACES_GROW: f64 = 60.0;
+const RESTARTED: f64 = 800.0;
+/// What is made whatever the cut.
+const ANY_MS: f64 = 2.0;
+/// Multipliers that a search over the depth takes on average, and the share of it that the first crossing alone takes.
+const PER_SEARCH: f64 = 40.0;
+const FIRST_ALONE: f64 = 0.5;
+/// The accuracy of maps takes half; refinement of a boundary adds to its speeds.
+const ON_MAP: f64 = 0.5;
+const REFINED: f64 = 1.8;
+/// Multipliers that the trials of pockets take.
+const TRIALS: f64 = 1500.0;
+
+/// Elements of a period: by oscillations, by breaks of the edges, and by what delays bring back.
+fn elements(case: &Case, rotation: &model::Rotation) -> f64 {
+    let (milling, turn) = (&case.milling, case.milling.period_rad());
+    let is_alike = milling.teeth_are_alike();
+    let teeth = milling.teeth.len() as f64;
+    let of_edge = 4.0 + 8.0 * f64::from(u8::from(milling.law.bends()));
+    let breaks = if is_alike { of_edge } else { 2.0 * of_edge * teeth };
+    // With run-out every tooth may meet what any other left.
+    let run_out = if milling.has_run_out() { 0.8 * teeth * teeth } else { 1.0 };
+    let periods = if rotation.varies() { rotation.rotation_rad(rotation.period_s(turn)) / turn } else { 1.0 };
+    2.0 * case.oscillations_at(rotation).min(N_MOST) + periods * (breaks * run_out + turn / 0.8)
+}
+
+/// Of one multiplier.
+fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
+    let oscillations = case.oscillations_at(rotation).min(N_MOST);
+    let directions = (0.5 * case.structure.basis.len() as f64).max(0.5).powf(1.5);
+    let spaces = (1.0 + oscillations / SPACES_GROW) * (oscillations / RESTARTED).max(1.0).powf(1.3);
+    // An edge whose law bends is summed on points, tooth by tooth.
+    let milling = &case.milling;
+    let is_summed = milling.law.bends() && milling.teeth.iter().any(|tooth| tooth.lag_rad_per_mm.abs() > 0.0);
+    let summed = if is_summed || !milling.has_one_helix() { 2.0 } else { 1.0 };
+    0.05 + ELEMENT_MS * directions * summed * elements(case, rotation) * spaces
+}
+
+/// Expected work.
+fn cost(job: &Job) -> Cost {
+    let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
+    let here = point_ms(&case, &case.rotation);
+    let directions = case.structure.basis.len() as f64;
+    let mut parts = vec![(ANY_MS, "/cut/spindle_speed_rpm")];
+    let mut bytes = 500_000.0 + 4e4 * elements(&case, &case.rotation) * directions;
+    if job.asks(Asked::Verdict) {
+        parts.push((4.0 * here, "/cut/spindle_speed_rpm"));
+    }
+    if job.asks(Asked::Motion) {
+        let repeats = case.milling.teeth_are_alike() && !case.rotation.varies();
+        parts.push((if repeats { 0.5 } else { 2.0 } * here, "/cut/spindle_speed_rpm"));
+    }
+    let steps = (f64::from(job.limits.depths) / 24.0).max(1.0);
+    if job.asks(Asked::Intervals) {
+        let others = 2.0 + directions + 2.0 * f64::from(u8::from(case.milling.law.bends()));
+        parts.push(((1.0 + FIRST_ALONE * others) * steps * PER_SEARCH * here, "/limits/depths"));
+    }
+    if job.asks(Asked::Proposals) {
+        // Some dozen cutters over a turn, whose elements are those of all teeth.
+        let teeth = case.milling.teeth.len() as f64;
+        parts.push((30.0 * FIRST_ALONE * PER_SEARCH * ON_MAP * here * teeth, "/cutter/teeth"));
+    }
+    if job.asks(Asked::Lobes) || job.asks(Asked::Speeds) {
+        let (from, to) = range_rpm(job, case.rotation.spindle_rpm);
+        // Slow speeds take longest; those that are not answered cost nothing.
+        let at = |speed: f64| {
+            let rotation = case.at_speed(speed).filter(|rotation| case.oscillations_at(rotation) <= N_MOST);
+            rotation.map_or(0.0, |rotation| ON_MAP * point_ms(&case, &rotation))
+        };
+        let mean = (0..9).map(|k| at(from + (to - from) * f64::from(k) / 8.0)).sum::<f64>() / 9.0;
+        let speeds = f64::from(job.lobes.speeds);
+        parts.push((REFINED * speeds * steps * PER_SEARCH * mean, "/lobes/speeds"));
+        if job.asks(Asked::Speeds) {
+            parts.push((TRIALS * mean, "/lobes/speeds"));
+        }
+        if job.asks(Asked::Lobes) && job.lobes.map {
+            parts.push((speeds * f64::from(job.lobes.depths) * mean, "/lobes/depths"));
+            bytes += 40.0 * speeds * f64::from(job.lobes.depths);
+        }
+    }
+    let ms = parts.iter().map(|(ms, _)| ms).sum();
+    let driver = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or("/cut", |(_, driver)| driver);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    Cost { ms, bytes: bytes as u64, driver }
+}
+
+/// The equations that acted.
+fn basis(job: &Job) -> Vec<Basis> {
+    let mut used = vec![
+        Basis { equation: "milling/2.2", source: "geometry of trochoidal teeth as circles" },
+        Basis { equation: "milling/2.3", source: "mechanistic and Kienzle force" },
+        Basis { equation: "milling/2.4", source: "Altintas, Budak 1995, in three directions" },
+        Basis { equation: "milling/3.10", source: "modal superposition of both sides" },
+        Basis { equation: "milling/4.16", source: "Altintas, Budak 1995" },
+    ];
+    if job.asks_stability() {
+        used.push(Basis { equation: "milling/4.15", source: "Floquet theory on spectral elements" });
+    }
+    if job.asks(Asked::Verdict) {
+        used.push(Basis { equation: "milling/4.19", source: "Fourier series of the leading disturbance" });
+    }
+    if job.asks(Asked::Intervals) || job.asks(Asked::Lobes) {
+        used.push(Basis { equation: "milling/4.17", source: "bracketing with the error of the modulus" });
+    }
+    if job.asks(Asked::Motion) {
+        used.push(Basis { equation: "milling/4.20", source: "periodic response of the linear system" });
+    }
+    if job.asks(Asked::Speeds) {
+        used.push(Basis { equation: "milling/7.25", source: "limits together, by removal rate" });
+    }
+    if job.asks(Asked::Proposals) {
+        used.push(Basis { equation: "milling/7.27", source: "cutters tried" });
+    }
+    if job.process_damping.is_some() {
+        used.push(Basis { equation: "milling/2.8", source: "indentation of the flank" });
+    }
+    if job.speed_variation.is_some() {
+        used.push(Basis { equation: "milling/4.18", source: "delay by the angle turned" });
+    }
+    if job.spindle.is_some() {
+        used.push(Basis { equation: "milling/2.9", source: "mean torque of undisturbed chips" });
+    }
+    used
+}
+
+/// Everything that this calculator may utter, from where it is said.
+const CODES: Codes = Codes {
+    faults: &[job::CODES],
+    failures: &[],
+    warnings: &[advice::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES],
+    stages: &[&["stage_multiplier", "stage_intervals", "stage_motion", "stage_boundary", "stage_map", "stage_done"]],
+    labels: &[picture::LABEL_CODES],
+};

@@ -11,7 +11,7 @@ use crate::kienzle::{self, Choice};
 
 pub(super) fn fill(calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>) {
     if let Some(machine) = &views.machine {
-        spindle(machine, writer);
+        spindle(calculator, machine, writer);
         turning::model(calculator, machine, writer);
     }
     if let Some(tool) = &views.tool {
@@ -23,9 +23,18 @@ pub(super) fn fill(calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>)
         }
     }
     if let Some(material) = views.material_of_force() {
-        force(material, writer);
+        // There a law is one of several.
+        if calculator == THREE_DIRECTIONS && writer.at("/force/kind").is_none() {
+            writer.put("/force/kind", json!("power_law"));
+        }
+        if calculator != THREE_DIRECTIONS || writer.at("/force/kind") == Some(&json!("power_law")) {
+            force(material, writer);
+        }
     }
 }
+
+/// The calculator whose jobs say by which law an edge cuts, and how fast a spindle turns.
+const THREE_DIRECTIONS: &str = "milling-stability";
 
 /// Where a machine states its fastest speed.
 const FASTEST: &str = "/spindle/speed_max_rpm";
@@ -35,7 +44,7 @@ fn whole(value: f64) -> Value {
     serde_json::from_str(&format!("{value:.0}")).unwrap_or_else(|_| json!(value))
 }
 
-fn spindle(machine: &View<'_>, writer: &mut Writer<'_>) {
+fn spindle(calculator: &str, machine: &View<'_>, writer: &mut Writer<'_>) {
     if let Some((value, part)) = machine.number("/spindle/efficiency") {
         writer.offer("/spindle/efficiency", value, vec![part]);
     }
@@ -56,7 +65,10 @@ fn spindle(machine: &View<'_>, writer: &mut Writer<'_>) {
             }
         }
     }
-    let Some((limit, _)) = machine.number(FASTEST) else { return };
+    let Some((limit, part)) = machine.number(FASTEST) else { return };
+    if calculator == THREE_DIRECTIONS {
+        writer.offer("/spindle/speed_max_rpm", limit, vec![part]);
+    }
     if let Some(speed) = writer.number("/cut/spindle_speed_rpm").filter(|speed| *speed > limit) {
         turning::above(machine, "/cut/spindle_speed_rpm", (speed, limit, "rev/min"), FASTEST, "spindle_speed", writer);
     }

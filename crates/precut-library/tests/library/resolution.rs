@@ -335,6 +335,30 @@ fn milling_gets_cutter_spindle_and_force() {
     }
 }
 
+/// There the law is one of several, and a spindle says how fast it turns.
+#[test]
+fn milling_in_three_directions_gets_a_law_and_the_fastest_speed() {
+    let mut job = json!({"machine": "hmc_bt50", "tool": "face_100_z7_sekt12", "material": "42CrMo4", "cut": {}});
+    faultless("milling-stability", &mut job);
+    assert_eq!(job["force"]["kind"], json!("power_law"));
+    assert_eq!(job["force"]["coefficient"], json!(2526.0));
+    assert!(job["spindle"]["speed_max_rpm"].as_f64().is_some_and(|speed| speed > 1000.0));
+    for (part, ok) in [
+        ("cutter", serde_json::from_value::<precut_calc::milling_stability::Cutter>(job["cutter"].clone()).is_ok()),
+        (
+            "spindle",
+            serde_json::from_value::<precut_calc::milling_stability::MillSpindle>(job["spindle"].clone()).is_ok(),
+        ),
+        ("force", serde_json::from_value::<precut_calc::milling_stability::EdgeForce>(job["force"].clone()).is_ok()),
+    ] {
+        assert!(ok, "{part}");
+    }
+    // Another law that the job states stays as it is.
+    let mut job = json!({"material": "42CrMo4", "force": {"kind": "mechanistic", "tangential_n_per_mm2": 900}});
+    faultless("milling-stability", &mut job);
+    assert_eq!(job["force"], json!({"kind": "mechanistic", "tangential_n_per_mm2": 900}));
+}
+
 /// Records by name, and what of the job says otherwise.
 fn any_job() -> impl Strategy<Value = Value> {
     let pick = |kind: Kind, of: &'static [&'static str]| {

@@ -9,8 +9,10 @@ use super::multiplier::{Kind, Multiplier, Orders};
 
 /// A step is not halved below this share of the depth looked at.
 const FINEST: f64 = 0.002;
+const ON_MAP_FINEST: f64 = 0.01;
 /// A crossing is found to this share of itself, and told between ends this share to either side.
 const FOUND: f64 = 1e-9;
+const ON_MAP_FOUND: f64 = 1e-4;
 const BRACKET: f64 = 4e-5;
 /// Steps of a search.
 const STEPS: u32 = 80;
@@ -43,32 +45,69 @@ pub struct Unstable {
     pub to: Option<Crossing>,
 }
 
-/// All crossings up to a depth, by depth. Between `steps` even ones the search is refined where one may hide.
-pub fn crossings(
-    orders: &Orders,
-    cut: &Cut<'_>,
-    depth_max_mm: f64,
-    steps: u32,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Crossing>, Failure> {
-    let look = Look { orders, cut, monitor };
+/// How crossings are looked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Up to this depth, mm.
+    pub depth_max_mm: f64,
+    /// Even steps; between them it is refined where a crossing may hide.
+    pub steps: u32,
+    /// Whether no crossing beyond the first is wanted.
+    pub only_first: bool,
+    /// Whether the accuracy of maps does: 1e-4 of the depth, not certified.
+    pub on_map: bool,
+}
+
+/// What was seen over the depth.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scan {
+    /// By depth.
+    pub crossings: Vec<Crossing>,
+    /// Depths that were looked at, mm, and ln |mu| there.
+    pub curve: Vec<(f64, f64)>,
+}
+
+impl Scan {
+    /// Depth at which it first becomes unstable, mm; 0 where it never was stable.
+    pub fn first_mm(&self) -> Option<f64> {
+        match self.crossings.first() {
+            Some(first) if first.enters => Some(first.depth_mm),
+            Some(_) => Some(0.0),
+            None => self.curve.first().filter(|(_, growth)| *growth >= 0.0).map(|_| 0.0),
+        }
+    }
+}
+
+/// Looks for crossings of one cut over the depth.
+pub fn scan(orders: &Orders, cut: &Cut<'_>, search: &Search, monitor: &dyn Monitor) -> Result<Scan, Failure> {
+    let Search { depth_max_mm, steps, .. } = *search;
+    let look = Look { orders, cut, monitor, on_map: search.on_map };
     let mut depths: Vec<f64> = (1..=steps).map(|k| depth_max_mm * f64::from(k) / f64::from(steps)).collect();
     depths.insert(0, 0.02 * depths[0]);
     depths.extend(helix_pitches(cut, depth_max_mm));
     depths.sort_by(f64::total_cmp);
     depths.dedup_by(|a, b| *a - *b < 1e-6 * depth_max_mm);
-    let mut known = Vec::with_capacity(depths.len());
+    let mut known: Vec<(f64, f64)> = Vec::with_capacity(depths.len());
     for depth in depths {
-        known.push((depth, look.growth(depth)?));
+        let growth = look.growth(depth)?;
+        known.push((depth, growth));
+        // What lies beyond does not matter; an island before it may still hide.
+        if search.only_first && growth >= 0.0 {
+            break;
+        }
     }
-    refine(&look, &mut known, FINEST * depth_max_mm)?;
+    let finest = if search.on_map { ON_MAP_FINEST } else { FINEST };
+    refine(&look, &mut known, finest * depth_max_mm)?;
     let mut found = Vec::new();
     for pair in known.windows(2) {
         if (pair[0].1 < 0.0) != (pair[1].1 < 0.0) {
             found.push(look.crossing(pair[0], pair[1])?);
+            if search.only_first {
+                break;
+            }
         }
     }
-    Ok(found)
+    Ok(Scan { crossings: found, curve: known })
 }
 
 /// The stretches that crossings bound.
@@ -137,6 +176,7 @@ struct Look<'a> {
     orders: &'a Orders,
     cut: &'a Cut<'a>,
     monitor: &'a dyn Monitor,
+    on_map: bool,
 }
 
 impl Look<'_> {
@@ -145,7 +185,12 @@ impl Look<'_> {
     }
 
     fn multiplier(&self, depth_mm: f64) -> Result<Multiplier, Failure> {
-        let found = self.orders.multiplier(&self.at(depth_mm), self.monitor)?;
+        let cut = self.at(depth_mm);
+        let found = if self.on_map {
+            self.orders.on_map(&cut, self.monitor)?
+        } else {
+            self.orders.multiplier(&cut, self.monitor)?
+        };
         found.ok_or(Failure::NotConverged { what: "multiplier", residual: f64::NAN, iterations: 0 })
     }
 
@@ -158,14 +203,15 @@ impl Look<'_> {
         let (mut a, mut b) = (from, to);
         let enters = from.1 < 0.0;
         let mut last_was_a = None;
+        let found = if self.on_map { ON_MAP_FOUND } else { FOUND };
         for _ in 0..STEPS {
-            if (b.0 - a.0) <= FOUND * b.0 {
+            if (b.0 - a.0) <= found * b.0 {
                 break;
             }
             let share = (a.1 / (a.1 - b.1)).clamp(1e-3, 1.0 - 1e-3);
             let depth = a.0 + share * (b.0 - a.0);
             let growth = self.growth(depth)?;
-            if growth.abs() < 1e-12 {
+            if growth.abs() < 1e-3 * found {
                 (a, b) = ((depth, growth), (depth, growth));
                 break;
             }
@@ -186,8 +232,8 @@ impl Look<'_> {
         let depth_mm = if a.1.abs() < b.1.abs() { a.0 } else { b.0 };
         let multiplier = self.multiplier(depth_mm)?;
         let bracket_mm = [depth_mm * (1.0 - BRACKET), depth_mm * (1.0 + BRACKET)];
-        let mut certified = true;
-        for (depth, is_above) in bracket_mm.into_iter().zip([false, true]) {
+        let mut certified = !self.on_map;
+        for (depth, is_above) in bracket_mm.into_iter().zip([false, true]).filter(|_| !self.on_map) {
             let held = self.orders.with_error(&self.at(depth), self.monitor)?.is_some_and(|(found, error)| {
                 let modulus = found.modulus();
                 if is_above == enters { modulus - error > 1.0 } else { modulus + error < 1.0 }

@@ -11,7 +11,7 @@
 //! the element it falls into; what falls into the running element enters its matrix. The map acts on (q, r at the points of
 //! the period before that are met).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::calculator::{Failure, Monitor, Pace};
 use crate::num::dde::{Propagator, Rule};
@@ -49,16 +49,28 @@ struct Met {
 struct Element {
     passage: usize,
     /// F by q and by the motion that is met; none where nothing is cut.
-    cut: Option<(DMatrix<f64>, Vec<Met>)>,
+    cut: Option<Forces>,
     /// Where its motion stands in the vector, where the next period meets it.
     kept: Option<usize>,
     /// Where it stands among the motions of the period.
     met_now: bool,
 }
 
+/// What acts beside the rubbing of flanks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Acting {
+    /// What earlier teeth left: the map of a disturbance.
+    Waves,
+    /// That and the force of undisturbed chips: the map of the motion itself.
+    WavesAndForce,
+    /// The force alone: of a motion that every tooth repeats no wave is left.
+    Force,
+}
+
 /// The map of a period.
 #[derive(Debug)]
 pub struct Map {
+    pub(super) times: Vec<f64>,
     passages: Vec<Passage>,
     elements: Vec<Element>,
     states: usize,
@@ -82,19 +94,31 @@ pub struct Cut<'a> {
 impl Map {
     /// The map; `None` where the equations of an element are singular.
     pub fn new<const P: usize>(cut: &Cut<'_>, rule: &Rule<P>, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
+        Self::of(cut, rule, Acting::Waves, monitor)
+    }
+
+    /// The same of what acts.
+    pub(super) fn of<const P: usize>(
+        cut: &Cut<'_>,
+        rule: &Rule<P>,
+        acting: Acting,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Self>, Failure> {
         let (structure, rotation) = (cut.structure, &cut.rotation);
         let edges = Edges::new(cut.milling, cut.depth_mm);
         let times = mesh::times_s(cut.milling, &edges, rotation, structure.fastest_rad_per_s());
         let directions = structure.basis.len();
         let rows = P * directions;
         let mut map =
-            Self { passages: Vec::new(), elements: Vec::new(), states: structure.states(), rows, dimension: 0 };
+            Self { times, passages: Vec::new(), elements: Vec::new(), states: structure.states(), rows, dimension: 0 };
         let mut pace = Pace::new(monitor);
-        for (index, pair) in times.windows(2).enumerate() {
+        for index in 0..map.times.len() - 1 {
+            let pair = [map.times[index], map.times[index + 1]];
             let length_s = pair[1] - pair[0];
             let passage = map.passage(cut, rule, length_s);
             pace.work(6 * rows.pow(3) + 60 * P * P * structure.modes.len())?;
-            let assembled = Assembly { cut, rule, edges: &edges, times: &times, index }.element(&map.passages[passage]);
+            let assembled =
+                Assembly { cut, rule, edges: &edges, times: &map.times, index, acting }.element(&map.passages[passage]);
             let cut = match assembled {
                 Assembled::Nothing => None,
                 Assembled::Cut(forces) => Some(forces),
@@ -121,7 +145,7 @@ impl Map {
             .elements
             .iter()
             .filter_map(|element| element.cut.as_ref())
-            .flat_map(|(_, met)| met.iter().map(|one| (one.element, one.is_before)))
+            .flat_map(|forces| forces.met.iter().map(|one| (one.element, one.is_before)))
             .collect();
         self.dimension = self.states;
         for (index, element) in self.elements.iter_mut().enumerate() {
@@ -138,6 +162,15 @@ impl Map {
         self.dimension
     }
 
+    /// Motion at the points of an element by the state at its beginning and the forces in it.
+    pub(super) fn motion(&self, element: usize, force: &[f64], state: &[f64]) -> Vec<f64> {
+        let passage = &self.passages[self.elements[element].passage];
+        let mut motion = vec![0.0; self.rows];
+        add_product(&mut motion, &passage.by_state, state);
+        add_product(&mut motion, &passage.by_force, force);
+        motion
+    }
+
     /// How many multiplications one application takes, roughly.
     pub fn work(&self) -> usize {
         self.elements.len() * self.rows * (3 * self.rows + 2 * self.states)
@@ -145,6 +178,12 @@ impl Map {
 
     /// One period on, in place.
     pub fn apply(&self, vector: &mut [f64]) {
+        self.apply_seen(vector, |_, _, _| ());
+    }
+
+    /// The same, showing of every element its number, the force at its points (in the basis, point by point) and the state at
+    /// its beginning.
+    pub(super) fn apply_seen(&self, vector: &mut [f64], mut seen: impl FnMut(usize, &[f64], &[f64])) {
         let mut q = vector[..self.states].to_vec();
         let mut kept: Vec<f64> = vector.to_vec();
         let mut now: Vec<Vec<f64>> = vec![Vec::new(); self.elements.len()];
@@ -152,7 +191,10 @@ impl Map {
         for (index, element) in self.elements.iter().enumerate() {
             let passage = &self.passages[element.passage];
             force.fill(0.0);
-            if let Some((by_state, met)) = &element.cut {
+            if let Some(Forces { by_state, met, driving }) = &element.cut {
+                if let Some(driving) = driving {
+                    force.copy_from_slice(driving);
+                }
                 add_product(&mut force, by_state, &q);
                 for one in met {
                     let from = match (one.is_before, self.elements[one.element].kept) {
@@ -162,6 +204,7 @@ impl Map {
                     add_product(&mut force, &one.matrix, from);
                 }
             }
+            seen(index, &force, &q);
             if element.kept.is_some() || element.met_now {
                 motion.fill(0.0);
                 add_product(&mut motion, &passage.by_state, &q);
@@ -185,6 +228,52 @@ impl Map {
             }
         }
         vector.copy_from_slice(&kept);
+        vector[..self.states].copy_from_slice(&q);
+    }
+}
+
+impl Map {
+    /// The transposed map, in place: its eigenvectors say how well an eigenvalue is conditioned.
+    pub(super) fn apply_transposed(&self, vector: &mut [f64]) {
+        let mut q = vector[..self.states].to_vec();
+        let mut met = vec![0.0; vector.len()];
+        let mut now: Vec<Vec<f64>> = self
+            .elements
+            .iter()
+            .map(|element| if element.met_now { vec![0.0; self.rows] } else { Vec::new() })
+            .collect();
+        let (mut force, mut motion) = (vec![0.0; self.rows], vec![0.0; self.rows]);
+        for (index, element) in self.elements.iter().enumerate().rev() {
+            let passage = &self.passages[element.passage];
+            motion.fill(0.0);
+            if let Some(at) = element.kept {
+                motion.copy_from_slice(&vector[at..at + self.rows]);
+            }
+            for (sum, value) in motion.iter_mut().zip(&now[index]) {
+                *sum += value;
+            }
+            let mut before = vec![0.0; self.states];
+            for ((pair, after), whole) in before.chunks_exact_mut(2).zip(q.chunks_exact(2)).zip(&passage.whole) {
+                pair[0] = whole[0][0] * after[0] + whole[1][0] * after[1];
+                pair[1] = whole[0][1] * after[0] + whole[1][1] * after[1];
+            }
+            add_transposed(&mut before, &passage.by_state, &motion);
+            if let Some(forces) = &element.cut {
+                force.fill(0.0);
+                add_transposed(&mut force, &passage.end_by_force, &q);
+                add_transposed(&mut force, &passage.by_force, &motion);
+                add_transposed(&mut before, &forces.by_state, &force);
+                for one in &forces.met {
+                    let target = match (one.is_before, self.elements[one.element].kept) {
+                        (true, Some(at)) => &mut met[at..at + self.rows],
+                        _ => &mut now[one.element][..],
+                    };
+                    add_transposed(target, &one.matrix, &force);
+                }
+            }
+            q = before;
+        }
+        vector.copy_from_slice(&met);
         vector[..self.states].copy_from_slice(&q);
     }
 }
@@ -250,10 +339,16 @@ struct Assembly<'a, const P: usize> {
     edges: &'a Edges<'a>,
     times: &'a [f64],
     index: usize,
+    acting: Acting,
 }
 
-/// F by the state, and the motions met with the matrices that make F of them.
-type Forces = (DMatrix<f64>, Vec<Met>);
+/// F by the state, the motions met with the matrices that make F of them, and F without either where chips drive.
+#[derive(Debug)]
+struct Forces {
+    by_state: DMatrix<f64>,
+    met: Vec<Met>,
+    driving: Option<Vec<f64>>,
+}
 
 /// What an element came to.
 enum Assembled {
@@ -272,10 +367,17 @@ impl<const P: usize> Assembly<'_, P> {
         let mut present: DMatrix<f64> = DMatrix::zeros(rows, rows);
         let mut rubbing: DMatrix<f64> = DMatrix::zeros(rows, rows);
         let mut met: Vec<Met> = Vec::new();
+        let mut chips: Vec<f64> = Vec::new();
+        let is_driven = self.acting != Acting::Waves;
         for (i, point) in self.rule.points.iter().enumerate() {
             let time = from + point * length;
-            let instant = self.edges.at(self.cut.rotation.rotation_rad(time));
-            for entry in &instant.entries {
+            let rotation_rad = self.cut.rotation.rotation_rad(time);
+            let instant = self.edges.at(rotation_rad);
+            if is_driven {
+                let (force, _) = self.edges.force(rotation_rad);
+                chips.extend(self.cut.structure.basis.iter().map(|b| dot(b, &force)));
+            }
+            for entry in instant.entries.iter().filter(|_| self.acting != Acting::Force) {
                 let stiffness = self.reduced(&entry.stiffness);
                 add_block(&mut present, i, i, d, &stiffness, 1.0);
                 let (element, is_before, weights) = self.met_at(time, entry.turned_rad, i);
@@ -302,7 +404,8 @@ impl<const P: usize> Assembly<'_, P> {
                 add_block(&mut rubbing, i, i, d, &self.reduced(&instant.rubbing), 1.0 / speed_mm_per_s);
             }
         }
-        if met.is_empty() && present.iter().all(|value| value.abs() <= 0.0) {
+        let is_still = |values: &[f64]| values.iter().all(|value| value.abs() <= 0.0);
+        if met.is_empty() && is_still(present.as_slice()) && is_still(rubbing.as_slice()) && is_still(&chips) {
             return Assembled::Nothing;
         }
         let mut system = DMatrix::identity(rows, rows) - &present * &passage.by_force;
@@ -315,7 +418,8 @@ impl<const P: usize> Assembly<'_, P> {
         for one in &mut met {
             one.matrix = &inverse * &one.matrix;
         }
-        Assembled::Cut((inverse * by_state, met))
+        let driving = is_driven.then(|| (&inverse * DVector::from_vec(chips)).as_slice().to_vec());
+        Assembled::Cut(Forces { by_state: inverse * by_state, met, driving })
     }
 
     /// D in the directions of the motion.
@@ -362,5 +466,56 @@ fn add_product(y: &mut [f64], matrix: &DMatrix<f64>, x: &[f64]) {
         for (sum, value) in y.iter_mut().zip(column) {
             *sum += value * factor;
         }
+    }
+}
+
+/// y += A' x, column by column.
+fn add_transposed(y: &mut [f64], matrix: &DMatrix<f64>, x: &[f64]) {
+    for (sum, column) in y.iter_mut().zip(matrix.as_slice().chunks_exact(x.len())) {
+        *sum += column.iter().zip(x).map(|(a, b)| a * b).sum::<f64>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calculator::Unwatched;
+    use crate::milling_stability::model::{Law, Mode, Side, Tooth};
+
+    /// y' (M x) = (M' y)' x for any x and y, where delays meet this period and the one before.
+    #[test]
+    fn the_transposed_map_is_that() {
+        let tooth = |pitch: f64| Tooth { pitch_rad: pitch, lag_rad_per_mm: 0.03, radial_mm: 0.0, axial_mm: 0.0 };
+        let milling = Milling {
+            radius_mm: 10.0,
+            teeth: vec![tooth(1.9), tooth(2.3), tooth(std::f64::consts::TAU - 4.2)],
+            edge_angle_rad: 1.3,
+            entry_rad: 0.2,
+            exit_rad: 1.4,
+            feed_mm: 0.1,
+            law: Law::Mechanistic { edge: [0.0; 3], cutting: [900.0, 400.0, 200.0] },
+            depth_exponent: 0.0,
+            rubbing: None,
+        };
+        let mode = |direction, frequency_hz| Mode {
+            side: Side::Tool,
+            direction,
+            frequency_hz,
+            damping_ratio: 0.03,
+            mass_kg: 0.4,
+        };
+        let structure = Structure::new(vec![mode([0.6, 0.8, 0.0], 500.0), mode([0.0, 0.6, 0.8], 820.0)]);
+        let cut = Cut { milling: &milling, structure: &structure, rotation: Rotation::steady(4000.0), depth_mm: 3.0 };
+        let rule: Rule<8> = Rule::new();
+        let Ok(Some(map)) = Map::new(&cut, &rule, &Unwatched) else { unreachable!("the map is regular") };
+        let vector =
+            |seed: f64| -> Vec<f64> { (0..map.dimension()).map(|k| (seed * (k as f64 + 1.0)).sin()).collect() };
+        let (x, y) = (vector(1.3), vector(0.7));
+        let (mut moved, mut back) = (x.clone(), y.clone());
+        map.apply(&mut moved);
+        map.apply_transposed(&mut back);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(p, q)| p * q).sum::<f64>();
+        let (one, other) = (dot(&y, &moved), dot(&back, &x));
+        assert!((one - other).abs() < 1e-11 * one.abs().max(1.0), "{one} {other}");
     }
 }

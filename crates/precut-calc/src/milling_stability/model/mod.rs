@@ -2,19 +2,25 @@
 
 mod cutter;
 mod edge;
+mod forced;
 mod intervals;
 mod map;
 mod mesh;
 mod multiplier;
 mod rotation;
+mod shares;
+mod statics;
 mod structure;
 mod zeroth;
 
 pub use cutter::{Law, Milling, Rubbing, Tensor, Tooth, Vector};
 pub use edge::{Edges, Engagement, Entry};
-pub use intervals::{Crossing, Unstable, crossings, unstable};
+pub use forced::{Forced, Roughness, Wall};
+pub use intervals::{Crossing, Scan, Search, Unstable, scan, unstable};
 pub use map::{Cut, Map};
 pub use multiplier::{Kind, Multiplier, Orders};
 pub use rotation::Rotation;
+pub use shares::{Alias, Shares};
+pub use statics::{Statics, statics};
 pub use structure::{Mode, Side, Structure};
 pub use zeroth::{Zeroth, mean_stiffness, zeroth};

@@ -1,15 +1,21 @@
 //! The multiplier of largest modulus, with what it may be wrong by.
 
 use crate::calculator::{Failure, Monitor, Pace, checkpoint};
-use crate::num::dde::{Rule, largest_paced};
+use crate::num::dde::{Rule, largest_paced, largest_pair_paced};
 
+use super::forced::{Forced, forced};
 use super::map::{Cut, Map};
+use super::shares::{Shares, shares};
 
-/// Points of an element, and of the finer one that tells the error.
-const POINTS: usize = 12;
+/// Points of an element, of the finer one that tells the error, and of one that does for a map.
+pub(super) const POINTS: usize = 12;
 const FINER: usize = 16;
-/// Residual of the eigenvalue over its modulus.
+const COARSE: usize = 8;
+/// Residual of the eigenvalue over its modulus, and that which does for a map.
 const TOLERANCE: f64 = 1e-11;
+const COARSE_TOLERANCE: f64 = 1e-6;
+/// Applications of the map before the search, which take away what decays at once.
+const POWER_STEPS: usize = 8;
 /// An imaginary part below this share is none.
 const REAL: f64 = 1e-7;
 
@@ -46,6 +52,11 @@ impl Multiplier {
         self.modulus().max(f64::MIN_POSITIVE).ln()
     }
 
+    /// Angle by which it turns in a period, 0 to pi.
+    pub fn angle_rad(&self) -> f64 {
+        self.im.abs().atan2(self.re)
+    }
+
     /// Its kind.
     pub fn kind(&self) -> Kind {
         if self.im.abs() > REAL * self.modulus() {
@@ -63,27 +74,95 @@ impl Multiplier {
 pub struct Orders {
     usual: Rule<POINTS>,
     finer: Rule<FINER>,
+    coarse: Rule<COARSE>,
 }
 
 impl Orders {
     /// The leading multiplier; `None` where the equations are singular.
     pub fn multiplier(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Multiplier>, Failure> {
-        leading(cut, &self.usual, monitor)
+        leading(cut, &self.usual, TOLERANCE, monitor)
     }
 
-    /// The same with its error in the modulus: against elements of a higher order, and what its eigenpair leaves.
+    /// The same to about 2e-5 of the modulus: for maps.
+    pub fn on_map(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Multiplier>, Failure> {
+        leading(cut, &self.coarse, COARSE_TOLERANCE, monitor)
+    }
+
+    /// Frequencies and modes of the disturbance that grows most or decays least (`milling/4.19`); `None` where there is none or
+    /// the period is so long that its aliases lie side by side.
+    pub fn shares(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Shares>, Failure> {
+        let Some(map) = Map::new(cut, &self.usual, monitor)? else { return Ok(None) };
+        let mut pace = Pace::new(monitor);
+        let mut applying = Pace::new(monitor);
+        let apply = |vector: &mut [f64]| {
+            map.apply(vector);
+            applying.work(map.work())
+        };
+        let (found, vector) =
+            largest_pair_paced(map.dimension(), POWER_STEPS, TOLERANCE, apply, |done| pace.work(done))?;
+        let Some(vector) = vector else { return Ok(None) };
+        shares(cut, &map, (found.re, found.im), &vector, POINTS, monitor)
+    }
+
+    /// The motion that repeats itself from period to period (`milling/4.20`); `None` where there is none.
+    pub fn forced<'a>(&'a self, cut: &'a Cut<'a>, monitor: &dyn Monitor) -> Result<Option<Forced<'a>>, Failure> {
+        forced(cut, &self.usual, monitor)
+    }
+
+    /// The same with its error in the modulus: against elements of a higher order, and what its eigenpair leaves times the
+    /// condition of the eigenvalue, by its left and right vector.
     pub fn with_error(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<(Multiplier, f64)>, Failure> {
-        let (usual, finer) = (leading(cut, &self.usual, monitor)?, leading(cut, &self.finer, monitor)?);
-        Ok(usual.zip(finer).map(|(usual, finer)| {
+        let usual = conditioned(cut, &self.usual, monitor)?;
+        let finer = leading(cut, &self.finer, TOLERANCE, monitor)?;
+        Ok(usual.zip(finer).map(|((usual, condition), finer)| {
             let error = (usual.modulus() - finer.modulus()).abs();
-            (finer, error + (usual.residual + finer.residual) * finer.modulus())
+            (finer, error + condition * (usual.residual + finer.residual) * finer.modulus())
         }))
     }
+}
+
+/// The leading multiplier and the condition of it as an eigenvalue, 1 at least.
+fn conditioned<const P: usize>(
+    cut: &Cut<'_>,
+    rule: &Rule<P>,
+    monitor: &dyn Monitor,
+) -> Result<Option<(Multiplier, f64)>, Failure> {
+    checkpoint(monitor)?;
+    let Some(map) = Map::new(cut, rule, monitor)? else { return Ok(None) };
+    let (mut pace, mut applying) = (Pace::new(monitor), Pace::new(monitor));
+    let apply = |vector: &mut [f64]| {
+        map.apply(vector);
+        applying.work(map.work())
+    };
+    let (found, right) = largest_pair_paced(map.dimension(), POWER_STEPS, TOLERANCE, apply, |done| pace.work(done))?;
+    if !found.modulus().is_finite() {
+        return Ok(None);
+    }
+    let (mut pace, mut applying) = (Pace::new(monitor), Pace::new(monitor));
+    let transposed = |vector: &mut [f64]| {
+        map.apply_transposed(vector);
+        applying.work(map.work())
+    };
+    let (_, left) =
+        largest_pair_paced(map.dimension(), POWER_STEPS, COARSE_TOLERANCE, transposed, |done| pace.work(done))?;
+    let condition = right.zip(left).map_or(1.0, |(right, left)| condition(&left, &right));
+    Ok(Some((Multiplier { re: found.re, im: found.im, residual: found.residual }, condition)))
+}
+
+/// |y| |x| over |y' x| of a left and a right vector, real and imaginary parts.
+fn condition((left_re, left_im): &(Vec<f64>, Vec<f64>), (right_re, right_im): &(Vec<f64>, Vec<f64>)) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(p, q)| p * q).sum::<f64>();
+    let length = |re: &[f64], im: &[f64]| (dot(re, re) + dot(im, im)).sqrt();
+    let re = dot(left_re, right_re) - dot(left_im, right_im);
+    let im = dot(left_re, right_im) + dot(left_im, right_re);
+    let found = length(left_re, left_im) * length(right_re, right_im) / re.hypot(im);
+    if found.is_finite() { found.max(1.0) } else { 1.0 }
 }
 
 fn leading<const P: usize>(
     cut: &Cut<'_>,
     rule: &Rule<P>,
+    tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<Option<Multiplier>, Failure> {
     checkpoint(monitor)?;
@@ -94,6 +173,6 @@ fn leading<const P: usize>(
         map.apply(vector);
         applying.work(map.work())
     };
-    let found = largest_paced(map.dimension(), 8, TOLERANCE, apply, |done| pace.work(done))?;
+    let found = largest_paced(map.dimension(), POWER_STEPS, tolerance, apply, |done| pace.work(done))?;
     Ok(found.modulus().is_finite().then_some(Multiplier { re: found.re, im: found.im, residual: found.residual }))
 }

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::Complex;
+
 use crate::num::dde::{Matrix, Propagator, Rule};
 
 use super::cutter::Vector;
@@ -50,12 +52,10 @@ impl Mode {
         ([[0.0, w], [-w, -2.0 * self.damping_ratio * w]], [0.0, MM_PER_S2 / (self.mass_kg * w)])
     }
 
-    /// x over a force of 1 N along the mode at the angular frequency, mm/N: real and imaginary part.
-    pub fn receptance(&self, rad_per_s: f64) -> (f64, f64) {
+    /// x over a force of 1 N along the mode that goes as exp(s t), mm/N; s in 1/s.
+    pub fn receptance_at(&self, s: Complex<f64>) -> Complex<f64> {
         let w = self.rad_per_s();
-        let (re, im) = (w * w - rad_per_s * rad_per_s, 2.0 * self.damping_ratio * w * rad_per_s);
-        let factor = MM_PER_S2 / (self.mass_kg * (re * re + im * im));
-        (re * factor, -im * factor)
+        (s * s + s * (2.0 * self.damping_ratio * w) + w * w).inv() * (MM_PER_S2 / self.mass_kg)
     }
 }
 

@@ -80,10 +80,10 @@ fn largest_real_part(structure: &Structure, w: &DMatrix<f64>, rad_per_s: f64) ->
     let d = structure.basis.len();
     let mut g: DMatrix<Complex<f64>> = DMatrix::zeros(d, d);
     for (mode, along) in structure.modes.iter().zip(&structure.directions) {
-        let (re, im) = mode.receptance(rad_per_s);
+        let receptance = mode.receptance_at(Complex::new(0.0, rad_per_s));
         for a in 0..d {
             for b in 0..d {
-                g[(a, b)] += Complex::new(re, im) * (along[a] * along[b]);
+                g[(a, b)] += receptance * (along[a] * along[b]);
             }
         }
     }

@@ -59,14 +59,39 @@ pub fn largest_paced<E>(
     dimension: usize,
     power_steps: usize,
     tolerance: f64,
+    apply: impl FnMut(&mut [f64]) -> Result<(), E>,
+    work: impl FnMut(usize) -> Result<(), E>,
+) -> Result<Eigenvalue, E> {
+    Ok(search(dimension, power_steps, tolerance, apply, work)?.0)
+}
+
+/// [`largest_paced`] with real and imaginary part of its eigenvector; no parts where there is none to be had.
+#[allow(clippy::type_complexity)]
+pub fn largest_pair_paced<E>(
+    dimension: usize,
+    power_steps: usize,
+    tolerance: f64,
+    apply: impl FnMut(&mut [f64]) -> Result<(), E>,
+    work: impl FnMut(usize) -> Result<(), E>,
+) -> Result<(Eigenvalue, Option<(Vec<f64>, Vec<f64>)>), E> {
+    let (found, space) = search(dimension, power_steps, tolerance, apply, work)?;
+    let vector = space.and_then(|space| space.vector(&found));
+    Ok((found, vector))
+}
+
+/// The largest eigenvalue and the space in which it was found; none where the map comes to nothing.
+fn search<E>(
+    dimension: usize,
+    power_steps: usize,
+    tolerance: f64,
     mut apply: impl FnMut(&mut [f64]) -> Result<(), E>,
     mut work: impl FnMut(usize) -> Result<(), E>,
-) -> Result<Eigenvalue, E> {
+) -> Result<(Eigenvalue, Option<Krylov>), E> {
     let mut start = start_vector(dimension);
     for _ in 0..power_steps {
         apply(&mut start)?;
         if normalise(&mut start) <= 0.0 {
-            return Ok(Eigenvalue { re: 0.0, im: 0.0, residual: 0.0 });
+            return Ok((Eigenvalue { re: 0.0, im: 0.0, residual: 0.0 }, None));
         }
     }
     let mut space = Krylov::new(&start);
@@ -82,7 +107,7 @@ pub fn largest_paced<E>(
         found = space.extend(tolerance, &mut apply, &mut work)?;
         space.verify(&mut found, &mut apply)?;
     }
-    Ok(found)
+    Ok((found, Some(space)))
 }
 
 /// A fixed sequence between -1 and 1 (a linear congruential generator), normalised.
@@ -232,14 +257,9 @@ impl Krylov {
         })
     }
 
-    /// Puts in place of the residual that of the vector itself, by applying the map to it. Kept Ritz vectors of a map that is
-    /// far from normal are nearly dependent, and T is then not what the map does to them.
-    fn verify<E>(
-        &mut self,
-        found: &mut Eigenvalue,
-        apply: &mut impl FnMut(&mut [f64]) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let Some(y) = ritz_vector(&self.square(), found.re, found.im) else { return Ok(()) };
+    /// Real and imaginary part of the Ritz vector.
+    fn vector(&self, found: &Eigenvalue) -> Option<(Vec<f64>, Vec<f64>)> {
+        let y = ritz_vector(&self.square(), found.re, found.im)?;
         let part = |of: fn(&Complex<f64>) -> f64| -> Vec<f64> {
             let mut sum = vec![0.0; self.basis[0].len()];
             for (vector, factor) in self.basis.iter().zip(y.iter().map(of)) {
@@ -247,7 +267,17 @@ impl Krylov {
             }
             sum
         };
-        let (re, im) = (part(|c| c.re), part(|c| c.im));
+        Some((part(|c| c.re), part(|c| c.im)))
+    }
+
+    /// Puts in place of the residual that of the vector itself, by applying the map to it. Kept Ritz vectors of a map that is
+    /// far from normal are nearly dependent, and T is then not what the map does to them.
+    fn verify<E>(
+        &mut self,
+        found: &mut Eigenvalue,
+        apply: &mut impl FnMut(&mut [f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Some((re, im)) = self.vector(found) else { return Ok(()) };
         let (mut moved_re, mut moved_im) = (re.clone(), im.clone());
         apply(&mut moved_re)?;
         apply(&mut moved_im)?;

@@ -9,6 +9,6 @@ mod krylov;
 mod map;
 mod rule;
 
-pub use krylov::{Eigenvalue, largest, largest_paced};
+pub use krylov::{Eigenvalue, largest, largest_paced, largest_pair_paced};
 pub use map::PeriodMap;
 pub use rule::{Matrix, Propagator, Rule, exponential, norm, product, times};

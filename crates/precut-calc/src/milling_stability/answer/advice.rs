@@ -1,0 +1,414 @@
+//! What is to be said of an answer, as codes with numbers.
+
+use crate::calculator::{Finding, Message};
+use crate::fixture_stability::{COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
+
+use super::super::job::{Asked, EdgeForce, Job, modes};
+use super::super::model::Law;
+use super::output::{
+    CutterProposal, InstabilityKind, MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
+};
+use super::proposals::effort;
+use super::{Aside, MODEL_ENDS, Study};
+
+/// Above this share of the limit a cut is near to it.
+const NEAR_LIMIT: f64 = 0.9;
+/// A floor of the chip matters where half or twice of it moves the limit by more than this share.
+const FLOOR_MATTERS: f64 = 0.05;
+/// The zeroth order misleads where it lies above the true limit by more than this share.
+const ABOVE: f64 = 0.02;
+/// One side limits where a rigid other one changes the limit by less than this share.
+const SAME: f64 = 0.02;
+/// Of a mode that has none.
+const UNDAMPED: f64 = 1e-9;
+/// A disturbance that takes longer than this decays slowly, s.
+const SLOW_S: f64 = 1.0;
+/// Forces below this are none, N.
+const NO_FORCE_N: f64 = 1e-6;
+
+pub(in crate::milling_stability) const WARNING_CODES: &[&str] = &[
+    "no_damping",
+    "near_chatter_limit",
+    "depth_not_examined",
+    "multiplier_not_converged",
+    "crossing_not_certified",
+    "zeroth_order_above",
+    "chip_floor_matters",
+    "process_damping_not_measured",
+    "modulation_moved",
+    "strip_offset_idle",
+    "spindle_power_exceeded",
+    "spindle_torque_exceeded",
+    "spindle_speed_outside_table",
+    "implausible_unit",
+    "motion_beyond_model",
+    "no_forced_motion",
+    "spindle_acceleration",
+];
+
+pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
+    "milling_stable",
+    "milling_settles_slowly",
+    "milling_chatters",
+    "milling_undecided",
+    "milling_overloaded",
+    "milling_surface_out",
+    "chatter_limit_is",
+    "no_chatter_limit",
+    "milling_island",
+    "milling_unstable_throughout",
+    "side_limits",
+    "both_sides_limit",
+    "direction_limits",
+    "milling_pushes",
+    "milling_lifts",
+    "spindle_suffices",
+    "spindle_limits_depth",
+    "milling_moves",
+    "wall_is_left",
+    "pocket_is",
+    "no_better_pocket",
+    "proposal_pitch",
+    "proposal_helix",
+    "proposal_speed_variation",
+    "no_proposal",
+    "zeroth_order_is",
+    "milling_not_modelled",
+];
+
+pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Finding> {
+    let (job, case) = (study.job, &study.case);
+    let mut found = Vec::new();
+    for ((at, _), mode) in modes(job).zip(&case.structure.modes) {
+        if mode.damping_ratio < UNDAMPED {
+            found.push(Finding::new("no_damping", format!("{at}/damping_ratio")));
+        }
+    }
+    let depth = case.depth_mm;
+    if let Some(limit) = outcome.first_limit_mm
+        && depth >= NEAR_LIMIT * limit
+        && depth < limit
+    {
+        found.push(Finding::new("near_chatter_limit", "/cut/depth_mm").measured(depth, limit, "mm"));
+    }
+    if outcome.islands_checked_to_mm.is_some_and(|to| depth > to) {
+        let to = outcome.examined_to_mm;
+        found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, to, "mm"));
+    }
+    if let Some(multiplier) = &outcome.multiplier
+        && (multiplier.modulus - 1.0).abs() <= multiplier.modulus_error
+    {
+        found.push(Finding::new("multiplier_not_converged", "/cut").measured(
+            multiplier.modulus,
+            multiplier.modulus_error,
+            "1",
+        ));
+    }
+    if let Some(doubtful) = outcome.unstable_intervals.iter().find(|interval| !interval.certified) {
+        let at = doubtful.from_mm.or(doubtful.to_mm).unwrap_or(0.0);
+        found.push(Finding::new("crossing_not_certified", "/limits/depths").value(at, "mm"));
+    }
+    if let (Some(zeroth), Some(limit)) = (outcome.zeroth_order_min_mm, outcome.first_limit_mm)
+        && zeroth > (1.0 + ABOVE) * limit
+    {
+        found.push(Finding::new("zeroth_order_above", "/cut").measured(zeroth, limit, "mm"));
+    }
+    found.extend(floor(study, outcome));
+    if let Some(without) = outcome.other_assumptions.without_process_damping_limit_mm {
+        let finding = Finding::new("process_damping_not_measured", "/process_damping/source");
+        found.push(match outcome.first_limit_mm {
+            Some(with) => finding.measured(without, with, "mm"),
+            None => finding.value(without, "mm"),
+        });
+    }
+    if let Some(of) = job.speed_variation
+        && (case.rotation.frequency_hz / of.frequency_hz - 1.0).abs() > 1e-9
+    {
+        found.push(Finding::new("modulation_moved", "/speed_variation/frequency_hz").measured(
+            of.frequency_hz,
+            case.rotation.frequency_hz,
+            "Hz",
+        ));
+    }
+    let most = job.spindle.as_ref().and_then(|spindle| spindle.acceleration_max_rad_per_s2);
+    if let Some(most) = most.filter(|_| case.rotation.varies()) {
+        let (asked, _) = effort(&case.rotation, 0.0);
+        if asked > most {
+            found.push(
+                Finding::new("spindle_acceleration", "/speed_variation/amplitude").measured(asked, most, "rad/s2"),
+            );
+        }
+    }
+    if job.cut.width_mm.is_some() && job.cut.milling.is_at_a_side() && job.cut.offset_mm.abs() > 0.0 {
+        found.push(Finding::new("strip_offset_idle", "/cut/offset_mm").value(job.cut.offset_mm, "mm"));
+    }
+    of_spindle(study, outcome, &mut found);
+    found.extend(implausible(job));
+    if let Some(swing) = aside.beyond_mm {
+        let limit = MODEL_ENDS * case.milling.radius_mm;
+        found.push(Finding::new("motion_beyond_model", "/cut/depth_mm").measured(swing, limit, "mm"));
+    }
+    if aside.no_motion {
+        found.push(Finding::new("no_forced_motion", "/cut/spindle_speed_rpm"));
+    }
+    found
+}
+
+/// Where another floor of the chip moves the limit.
+fn floor(study: &Study<'_>, outcome: &Outcome) -> Option<Finding> {
+    let other = &outcome.other_assumptions;
+    let (halved, doubled) = (other.floor_halved_limit_mm?, other.floor_doubled_limit_mm?);
+    let limit = outcome.first_limit_mm?;
+    let moved = (halved / limit - 1.0).abs().max((doubled / limit - 1.0).abs());
+    let Law::Power { floor_mm, .. } = study.case.milling.law else { return None };
+    (moved > FLOOR_MATTERS).then(|| {
+        Finding::new("chip_floor_matters", "/force/chip_floor_mm")
+            .measured(floor_mm, 0.0, "mm")
+            .with("halved_mm", halved)
+            .with("doubled_mm", doubled)
+            .with("limit_mm", limit)
+    })
+}
+
+fn of_spindle(study: &Study<'_>, outcome: &Outcome, found: &mut Vec<Finding>) {
+    let force = &outcome.force;
+    if let Some(limit) = force.power_limit_kw.filter(|limit| force.motor_power_kw > *limit) {
+        found.push(Finding::new("spindle_power_exceeded", "/cut/depth_mm").measured(force.motor_power_kw, limit, "kW"));
+    }
+    if let Some(limit) = force.torque_limit_n_m.filter(|limit| force.torque_mean_n_m > *limit) {
+        let asked = force.torque_mean_n_m;
+        found.push(Finding::new("spindle_torque_exceeded", "/cut/depth_mm").measured(asked, limit, "N m"));
+    }
+    let tabled = study.job.spindle.as_ref().and_then(|spindle| spindle.drive().tabled_rpm());
+    if let Some((from, to)) = tabled {
+        let speed = study.case.rotation.spindle_rpm;
+        if speed < from || speed > to {
+            let end = if speed < from { from } else { to };
+            found.push(
+                Finding::new("spindle_speed_outside_table", "/cut/spindle_speed_rpm").measured(speed, end, "rev/min"),
+            );
+        }
+    }
+}
+
+/// Numbers that were likely given in another unit. None is changed.
+fn implausible(job: &Job) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for (at, mode) in modes(job) {
+        match (mode.frequency_hz, mode.natural_hz()) {
+            (Some(stated), _) => found.extend(STATED_FREQUENCY.on(stated, format!("{at}/frequency_hz"))),
+            (None, Some(implied)) => found.extend(FREQUENCY.on(implied, format!("{at}/stiffness_n_per_mm"))),
+            _ => {}
+        }
+        match (mode.damping_ratio, mode.ratio()) {
+            (Some(stated), _) => found.extend(STATED_RATIO.on(stated, format!("{at}/damping_ratio"))),
+            (None, Some(implied)) => found.extend(DAMPING.on(implied, format!("{at}/damping_n_s_per_mm"))),
+            _ => {}
+        }
+    }
+    match &job.force {
+        EdgeForce::Mechanistic(of) => {
+            found.extend(COEFFICIENT.on(of.tangential_n_per_mm2, "/force/tangential_n_per_mm2"));
+            found.extend(EDGE.on(of.tangential_edge_n_per_mm, "/force/tangential_edge_n_per_mm"));
+        }
+        EdgeForce::Kienzle(of) => {
+            found.extend(COEFFICIENT.on(of.tangential_n_per_mm2, "/force/tangential_n_per_mm2"));
+        }
+        EdgeForce::PowerLaw(of) => found.extend(COEFFICIENT.on(of.coefficient, "/force/coefficient")),
+    }
+    found.extend(job.feed_mm().and_then(|feed| FEED.on(feed, "/cut/feed_mm_per_tooth")));
+    found
+}
+
+pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
+    let mut said: Vec<Message> = of_verdict(study, outcome).into_iter().collect();
+    if outcome.islands_checked_to_mm.is_some() {
+        said.push(match outcome.first_limit_mm {
+            Some(limit) if limit > 0.0 => Message::new("chatter_limit_is")
+                .with("depth_mm", limit)
+                .with("spindle_speed_rpm", study.case.rotation.spindle_rpm),
+            Some(_) => Message::new("milling_unstable_throughout"),
+            None => Message::new("no_chatter_limit").with("depth_mm", outcome.examined_to_mm),
+        });
+        said.extend(outcome.unstable_intervals.iter().filter_map(island));
+    }
+    said.extend(outcome.limited_by.iter().flat_map(|limited| of_sides(limited, outcome)));
+    said.extend(of_drive(outcome));
+    let work = &outcome.force.work;
+    said.push(
+        Message::new("milling_pushes")
+            .with("x_mean_n", work.x_mean_n)
+            .with("y_mean_n", work.y_mean_n)
+            .with("x_peak_n", work.x_max_n.abs().max(work.x_min_n.abs()))
+            .with("y_peak_n", work.y_max_n.abs().max(work.y_min_n.abs())),
+    );
+    if work.z_max_n > NO_FORCE_N {
+        said.push(Message::new("milling_lifts").with("peak_n", work.z_max_n).with("mean_n", work.z_mean_n));
+    }
+    if let Some(motion) = &outcome.motion {
+        said.push(Message::new("milling_moves").with("peak_to_peak_um", motion.peak_to_peak_um));
+        said.extend(motion.walls.iter().map(|wall| {
+            Message::new("wall_is_left")
+                .with("error_min_um", wall.error_min_um)
+                .with("error_max_um", wall.error_max_um)
+                .with("rz_um", wall.roughness_rz_um)
+        }));
+    }
+    if outcome.speed_curve.is_some() {
+        said.extend(of_speeds(study, outcome));
+    }
+    if study.job.asks(Asked::Proposals) {
+        said.extend(of_proposals(outcome));
+    }
+    if let (Some(depth), Some(hz)) = (outcome.zeroth_order_min_mm, outcome.zeroth_order_frequency_hz) {
+        said.push(Message::new("zeroth_order_is").with("depth_mm", depth).with("frequency_hz", hz));
+    }
+    said.push(Message::new("milling_not_modelled"));
+    said
+}
+
+fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
+    let (Some(verdict), Some(multiplier)) = (&outcome.verdict, &outcome.multiplier) else { return Vec::new() };
+    let mut said = vec![match verdict.state {
+        MillingState::Stable => Message::new("milling_stable").with("per_tooth", multiplier.per_tooth),
+        MillingState::Chatter => {
+            let message = Message::new("milling_chatters")
+                .with("per_tooth", multiplier.per_tooth)
+                .with("kind", multiplier.kind.name());
+            match multiplier.chatter_frequency_hz.filter(|_| multiplier.kind != InstabilityKind::Fold) {
+                Some(hz) => message.with("frequency_hz", hz),
+                None => message,
+            }
+        }
+        MillingState::Undecided => Message::new("milling_undecided").with("modulus", multiplier.modulus),
+        MillingState::Overloaded => {
+            Message::new("milling_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0))
+        }
+        MillingState::SurfaceOut => Message::new("milling_surface_out"),
+    }];
+    if let Some(time_s) = multiplier.settling_time_s.filter(|time| *time > SLOW_S) {
+        said.push(
+            Message::new("milling_settles_slowly")
+                .with("time_s", time_s)
+                .with("teeth", (time_s / study.case.tooth_period_s()).ceil())
+                .with("per_tooth", multiplier.per_tooth),
+        );
+    }
+    said
+}
+
+/// A stretch with an end is an island: below and above it the cut is stable.
+fn island(interval: &UnstableInterval) -> Option<Message> {
+    let (from, to) = (interval.from_mm?, interval.to_mm?);
+    Some(Message::new("milling_island").with("from_mm", from).with("to_mm", to).with("kind", interval.kind.name()))
+}
+
+/// Which side and which direction limits: by limits with the other one rigid.
+fn of_sides(limited: &RigidLimits, outcome: &Outcome) -> Vec<Message> {
+    let Some(limit) = outcome.first_limit_mm else { return Vec::new() };
+    let has = |name: &str| limited.tried.iter().any(|tried| tried == name);
+    let told = |message: Message, name: &'static str, value: Option<f64>| match value {
+        Some(value) => message.with(name, value),
+        None => message,
+    };
+    let changes = |other: Option<f64>| other.is_none_or(|other| (other / limit - 1.0).abs() > SAME);
+    let mut said = Vec::new();
+    if has("tool") && has("work") {
+        let (tool, work) = (limited.tool_rigid_limit_mm, limited.work_rigid_limit_mm);
+        // The side limits whose stiffening changes the limit while that of the other does not.
+        let message = match (changes(tool), changes(work)) {
+            (true, false) => Message::new("side_limits").with("side", "tool"),
+            (false, true) => Message::new("side_limits").with("side", "work"),
+            _ => Message::new("both_sides_limit"),
+        };
+        let message = message.with("limit_mm", limit).with("examined_mm", limited.examined_to_mm);
+        said.push(told(told(message, "tool_rigid_mm", tool), "work_rigid_mm", work));
+    }
+    let axes = [("x", limited.x_rigid_limit_mm), ("y", limited.y_rigid_limit_mm), ("z", limited.z_rigid_limit_mm)];
+    let tried: Vec<_> = axes.into_iter().filter(|(name, _)| has(name)).collect();
+    // Of several directions the one whose stiffening gains most.
+    let gained = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
+    if let Some((axis, value)) =
+        tried.iter().max_by(|a, b| gained(a.1).total_cmp(&gained(b.1))).filter(|_| tried.len() > 1)
+        && gained(*value) > (1.0 + SAME) * limit
+    {
+        let message = Message::new("direction_limits")
+            .with("axis", *axis)
+            .with("limit_mm", limit)
+            .with("examined_mm", limited.examined_to_mm);
+        said.push(told(message, "rigid_mm", *value));
+    }
+    said
+}
+
+/// The best speeds, or that there is none.
+fn of_speeds(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
+    let now = outcome.engagement.removal_rate_cm3_per_min;
+    if outcome.speeds.is_empty() {
+        return vec![Message::new("no_better_pocket").with("removal_rate_cm3_per_min", now)];
+    }
+    let of = |pocket: &SpeedPocket| {
+        Message::new("pocket_is")
+            .with("spindle_speed_rpm", pocket.spindle_speed_rpm)
+            .with("depth_mm", pocket.depth_mm)
+            .with("removal_rate_cm3_per_min", pocket.removal_rate_cm3_per_min)
+            .with("now_cm3_per_min", now)
+            .with("binds", pocket.binds.name())
+            .with("margin_percent", study.job.limits.margin_percent)
+    };
+    outcome.speeds.iter().map(of).collect()
+}
+
+/// `70-110-70-110`.
+fn pitches(pitch_deg: &[f64]) -> String {
+    let of = |pitch: &f64| format!("{}", (pitch * 100.0).round() / 100.0);
+    pitch_deg.iter().map(of).collect::<Vec<_>>().join("-")
+}
+
+/// What else was tried and gains.
+fn of_proposals(outcome: &Outcome) -> Vec<Message> {
+    if outcome.proposals.is_empty() {
+        return vec![Message::new("no_proposal")];
+    }
+    let of = |proposal: &CutterProposal| {
+        let message = match proposal.kind {
+            ProposalKind::Pitch => Message::new("proposal_pitch").with("pitches", pitches(&proposal.pitch_deg)),
+            ProposalKind::Helix => {
+                Message::new("proposal_helix").with("helix_angle_deg", proposal.helix_angle_deg.unwrap_or(0.0))
+            }
+            ProposalKind::SpeedVariation => Message::new("proposal_speed_variation")
+                .with("amplitude", proposal.amplitude.unwrap_or(0.0))
+                .with("frequency_hz", proposal.frequency_hz.unwrap_or(0.0)),
+        };
+        let limit = |message: Message, name: &'static str, limit: Option<f64>| match limit {
+            Some(limit) => message.with(name, limit),
+            None => message,
+        };
+        let message = message.with("gain_percent", proposal.gain_percent).with("examined_mm", outcome.examined_to_mm);
+        limit(limit(message, "limit_mm", proposal.first_limit_mm), "now_mm", proposal.first_limit_now_mm)
+    };
+    outcome.proposals.iter().map(of).collect()
+}
+
+/// What the spindle allows at this speed, where something is known of it.
+fn of_drive(outcome: &Outcome) -> Option<Message> {
+    let force = &outcome.force;
+    let (power, torque) = (force.power_depth_mm, force.torque_depth_mm);
+    let depth = [power, torque].into_iter().flatten().reduce(f64::min)?;
+    let what = if power.is_some_and(|power| power <= depth) { "power" } else { "torque" };
+    // Before or beyond chatter is said where it was looked for.
+    outcome.islands_checked_to_mm?;
+    let code = match outcome.first_limit_mm {
+        Some(chatter) if chatter < depth => "spindle_suffices",
+        Some(_) => "spindle_limits_depth",
+        None if depth <= outcome.examined_to_mm => "spindle_limits_depth",
+        None => return None,
+    };
+    Some(
+        Message::new(code)
+            .with("what", what)
+            .with("depth_mm", depth)
+            .with("power_kw", force.motor_power_kw)
+            .with("torque_n_m", force.torque_mean_n_m),
+    )
+}

@@ -1,0 +1,406 @@
+//! The answer: numbers, pictures, and what is said of it.
+
+pub(super) mod advice;
+mod lobes;
+pub(super) mod output;
+pub(super) mod picture;
+mod proposals;
+mod rigid;
+mod speeds;
+
+use std::f64::consts::{PI, TAU};
+
+use crate::calculator::{Failure, Message, Monitor};
+use crate::fixture_stability::power_kw;
+
+use super::job::{Asked, Case, Job, RubbingSource};
+use super::model::{
+    self, Cut, Law, Milling, Multiplier, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan, statics,
+    unstable, zeroth,
+};
+use output::{
+    DepthLine, ForceOfSide, FrequencyShare, LeadingMultiplier, MillingCost, MillingEngagement, MillingForces,
+    MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, UnstableInterval, WallSide,
+    WallSurface, YieldingSide,
+};
+
+const UM_PER_MM: f64 = 1e3;
+const N_MM_PER_N_M: f64 = 1e3;
+const MM3_PER_CM3: f64 = 1e3;
+/// A disturbance of this share has died away.
+const DECAYED: f64 = 1e-3;
+/// Depths are looked at up to so many times the least limit of the zeroth order, and so many times the working depth.
+const ZEROTH_TIMES: f64 = 6.0;
+const WORKING_TIMES: f64 = 1.5;
+/// Where there is neither.
+const SOME_DEPTH_MM: f64 = 10.0;
+/// The deepest that is looked at.
+const DEEPEST_MM: f64 = 1000.0;
+/// Short of the height at which two teeth meet.
+const SHORT_OF_MEETING: f64 = 0.99;
+/// Heights at which the error of a wall is told.
+const HEIGHTS: u32 = 20;
+/// Motion beyond this share of the radius ends the model.
+pub(super) const MODEL_ENDS: f64 = 0.2;
+
+/// What is computed for one job.
+pub(super) struct Study<'a> {
+    pub job: &'a Job,
+    pub case: Case,
+    pub orders: Orders,
+    pub zeroth: Option<Zeroth>,
+    pub examined_mm: f64,
+    /// Mean torque of 1 mm of depth.
+    torque_at_1_mm_n_m: f64,
+    pub monitor: &'a dyn Monitor,
+}
+
+/// Numbers beside the answer that sentences need.
+#[derive(Debug, Default)]
+pub(super) struct Aside {
+    /// Swing of a motion that is beyond the model, mm.
+    pub beyond_mm: Option<f64>,
+    /// No periodic motion was found.
+    pub no_motion: bool,
+}
+
+impl<'a> Study<'a> {
+    pub(super) fn new(job: &'a Job, case: Case, monitor: &'a dyn Monitor) -> Self {
+        let zeroth = if case.structure.modes.is_empty() { None } else { zeroth(&case.milling, &case.structure) };
+        let examined_mm = examined_mm(job, &case, zeroth);
+        let torque_at_1_mm_n_m = statics(&case.milling, 1.0).torque_mean_n_mm / N_MM_PER_N_M;
+        Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, monitor }
+    }
+
+    pub(super) fn cut(&self) -> Cut<'_> {
+        self.of(&self.case.milling, &self.case.structure)
+    }
+
+    /// The same cut with another cutter or structure.
+    pub(super) fn of<'b>(&self, milling: &'b Milling, structure: &'b Structure) -> Cut<'b> {
+        Cut { milling, structure, rotation: self.case.rotation, depth_mm: self.case.depth_mm }
+    }
+
+    /// The exponent by which 1 over the modulus of a period becomes that of a tooth.
+    pub(super) fn teeth_per_period(&self, rotation: &Rotation) -> f64 {
+        let turned = rotation.rotation_rad(rotation.period_s(self.case.milling.period_rad()));
+        turned / TAU * self.case.milling.teeth.len() as f64
+    }
+
+    /// Depths at which power and torque of the spindle give out at a speed, mm.
+    pub(super) fn drive_depths_mm(&self, spindle_rpm: f64) -> [Option<f64>; 2] {
+        let Some(spindle) = &self.job.spindle else { return [None; 2] };
+        let available = spindle.drive().available(spindle_rpm);
+        let torque_at_1_mm = self.torque_at_1_mm_n_m;
+        let power_at_1_mm = power_kw(torque_at_1_mm, spindle_rpm) / spindle.efficiency;
+        let exponent = 1.0 / (1.0 - self.case.milling.depth_exponent);
+        let depth = |limit: Option<f64>, at_1_mm: f64| {
+            limit.filter(|_| at_1_mm > 0.0).map(|limit| (limit / at_1_mm).powf(exponent))
+        };
+        [depth(available.power_kw, power_at_1_mm), depth(available.torque_n_m, torque_at_1_mm)]
+    }
+}
+
+/// How deep is looked: as the job says, or by the zeroth order, and never where two teeth have met.
+fn examined_mm(job: &Job, case: &Case, zeroth: Option<Zeroth>) -> f64 {
+    let usual = || {
+        let by_limit = zeroth.map_or(SOME_DEPTH_MM, |zeroth| ZEROTH_TIMES * zeroth.depth_mm);
+        by_limit.max(WORKING_TIMES * case.depth_mm).min(DEEPEST_MM)
+    };
+    let asked = job.limits.depth_max_mm.unwrap_or_else(usual);
+    asked.min(SHORT_OF_MEETING * Case::teeth_meet_mm(&case.milling))
+}
+
+pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, Aside), Failure> {
+    let (job, case, monitor) = (study.job, &study.case, study.monitor);
+    let mut aside = Aside::default();
+    monitor.progress(0.02, Message::new("stage_multiplier"));
+    let force = forces(study);
+    let multiplier = if job.asks(Asked::Verdict) { Some(multiplier(study)?) } else { None };
+    monitor.progress(0.1, Message::new("stage_intervals"));
+    let seen = if job.asks(Asked::Intervals) { Some(scan_of(study, &study.cut(), false)?) } else { None };
+    let limited_by = if seen.is_some() { rigid::limits(study)? } else { None };
+    let other_assumptions = if seen.is_some() { other_assumptions(study)? } else { OtherAssumptions::default() };
+    monitor.progress(0.4, Message::new("stage_motion"));
+    let motion = if job.asks(Asked::Motion) { motion(study, &mut aside)? } else { None };
+    let rows = if job.asks(Asked::Lobes) || job.asks(Asked::Speeds) { lobes::rows(study)? } else { Vec::new() };
+    let lobes = if job.asks(Asked::Lobes) { Some(lobes::lobes(study, &rows)?) } else { None };
+    let first_limit_mm = seen.as_ref().and_then(Scan::first_mm);
+    let verdict = multiplier.as_ref().map(|(found, ..)| MillingVerdict {
+        state: state(study, found, &force, motion.as_ref()),
+        depth_margin: first_limit_mm.filter(|_| case.depth_mm > 0.0).map(|limit| limit / case.depth_mm),
+        drive_margin: drive_margin(&force),
+    });
+    let energy = multiplier.as_ref().and_then(|(_, energy)| energy.clone());
+    let mut outcome = Outcome {
+        verdict,
+        engagement: engagement(study),
+        force,
+        multiplier: multiplier.map(|(found, _)| found),
+        modes: modes(case, energy.as_deref()),
+        first_limit_mm,
+        unstable_intervals: seen.as_ref().map(intervals).unwrap_or_default(),
+        examined_to_mm: study.examined_mm,
+        islands_checked_to_mm: seen.as_ref().map(|_| study.examined_mm),
+        depth_line: seen.as_ref().map(|seen| depth_line(study, seen)),
+        limited_by,
+        other_assumptions,
+        zeroth_order_min_mm: study.zeroth.map(|zeroth| zeroth.depth_mm),
+        zeroth_order_frequency_hz: study.zeroth.map(|zeroth| zeroth.frequency_hz),
+        motion,
+        lobes,
+        speeds: Vec::new(),
+        speed_curve: None,
+        proposals: Vec::new(),
+        cost: MillingCost { oscillations_per_period: case.oscillations(), estimate_ms },
+    };
+    if job.asks(Asked::Speeds) {
+        let (best, curve) = speeds::speeds(study, &rows, &outcome)?;
+        (outcome.speeds, outcome.speed_curve) = (best, Some(curve));
+    }
+    if job.asks(Asked::Proposals) {
+        let hz = outcome.multiplier.as_ref().and_then(|multiplier| multiplier.chatter_frequency_hz);
+        outcome.proposals = proposals::proposals(study, hz.or(outcome.zeroth_order_frequency_hz))?;
+    }
+    Ok((outcome, aside))
+}
+
+/// Crossings of a cut over the depth.
+fn scan_of(study: &Study<'_>, cut: &Cut<'_>, only_first: bool) -> Result<Scan, Failure> {
+    let search = Search { depth_max_mm: study.examined_mm, steps: study.job.limits.depths, only_first, on_map: false };
+    scan(&study.orders, cut, &search, study.monitor)
+}
+
+/// Whether the floor of the chip plays a part: a power of the chip in an arc that reaches no chip.
+fn floor_acts(milling: &Milling) -> bool {
+    milling.law.bends() && (milling.entry_rad < 1e-9 || milling.exit_rad > PI - 1e-9)
+}
+
+fn other_assumptions(study: &Study<'_>) -> Result<OtherAssumptions, Failure> {
+    let milling = &study.case.milling;
+    let limit = |milling: &Milling| -> Result<Option<f64>, Failure> {
+        Ok(scan_of(study, &study.of(milling, &study.case.structure), true)?.first_mm())
+    };
+    let mut found = OtherAssumptions::default();
+    if floor_acts(milling)
+        && let Law::Power { floor_mm, .. } = milling.law
+        && floor_mm > 0.0
+    {
+        let with_floor = |times: f64| {
+            let mut other = milling.clone();
+            if let Law::Power { floor_mm, .. } = &mut other.law {
+                *floor_mm *= times;
+            }
+            other
+        };
+        found.floor_halved_limit_mm = limit(&with_floor(0.5))?;
+        found.floor_doubled_limit_mm = limit(&with_floor(2.0))?;
+    }
+    if study.job.process_damping.as_ref().is_some_and(|of| of.source != RubbingSource::Measured) {
+        found.without_process_damping_limit_mm = limit(&Milling { rubbing: None, ..milling.clone() })?;
+    }
+    Ok(found)
+}
+
+fn state(
+    study: &Study<'_>,
+    multiplier: &LeadingMultiplier,
+    force: &MillingForces,
+    motion: Option<&MillingMotion>,
+) -> MillingState {
+    if (multiplier.modulus - 1.0).abs() <= multiplier.modulus_error {
+        return MillingState::Undecided;
+    }
+    if multiplier.modulus > 1.0 {
+        return MillingState::Chatter;
+    }
+    if drive_margin(force).is_some_and(|margin| margin < 1.0) {
+        return MillingState::Overloaded;
+    }
+    let limits = &study.job.limits;
+    let passes = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value > limit);
+    let is_out = motion.is_some_and(|motion| {
+        passes(motion.peak_to_peak_um, limits.amplitude_max_um)
+            || motion.walls.iter().any(|wall| {
+                passes(wall.largest_um(), limits.surface_error_max_um)
+                    || passes(wall.roughness_rz_um, limits.roughness_max_um)
+            })
+    });
+    if is_out { MillingState::SurfaceOut } else { MillingState::Stable }
+}
+
+fn drive_margin(force: &MillingForces) -> Option<f64> {
+    let of = |limit: Option<f64>, asked: f64| limit.filter(|_| asked > 0.0).map(|limit| limit / asked);
+    let both = [of(force.power_limit_kw, force.motor_power_kw), of(force.torque_limit_n_m, force.torque_mean_n_m)];
+    both.into_iter().flatten().reduce(f64::min)
+}
+
+fn engagement(study: &Study<'_>) -> MillingEngagement {
+    let case = &study.case;
+    let (milling, rotation) = (&case.milling, &case.rotation);
+    let teeth = milling.teeth.len() as f64;
+    let per_min = milling.feed_mm * teeth * rotation.spindle_rpm;
+    let lag = milling.teeth[0].lag_rad_per_mm.abs();
+    MillingEngagement {
+        entry_angle_deg: milling.entry_rad.to_degrees(),
+        exit_angle_deg: milling.exit_rad.to_degrees(),
+        width_mm: case.width_mm,
+        teeth_in_cut_mean: teeth * (milling.exit_rad - milling.entry_rad) / TAU,
+        helix_pitch_mm: (lag > 0.0 && milling.has_one_helix()).then(|| TAU / (teeth * lag)),
+        spindle_speed_rpm: rotation.spindle_rpm,
+        speed_m_per_min: TAU * milling.radius_mm * rotation.spindle_rpm / 1e3,
+        feed_mm_per_tooth: milling.feed_mm,
+        feed_mm_per_min: per_min,
+        tooth_frequency_hz: 1.0 / case.tooth_period_s(),
+        removal_rate_cm3_per_min: case.width_mm * case.depth_mm * per_min / MM3_PER_CM3,
+    }
+}
+
+fn forces(study: &Study<'_>) -> MillingForces {
+    let case = &study.case;
+    let found = statics(&case.milling, case.depth_mm);
+    let torque = found.torque_mean_n_mm / N_MM_PER_N_M;
+    let power = power_kw(torque, case.rotation.spindle_rpm);
+    let available = study.job.spindle.as_ref().map(|spindle| spindle.drive().available(case.rotation.spindle_rpm));
+    let [power_depth_mm, torque_depth_mm] = study.drive_depths_mm(case.rotation.spindle_rpm);
+    let turned = |of: model::Vector| of.map(|force| -force);
+    MillingForces {
+        tool: ForceOfSide::of(found.mean_n, found.min_n, found.max_n),
+        work: ForceOfSide::of(turned(found.mean_n), turned(found.max_n), turned(found.min_n)),
+        torque_mean_n_m: torque,
+        torque_max_n_m: found.torque_max_n_mm / N_MM_PER_N_M,
+        power_kw: power,
+        motor_power_kw: power / study.job.spindle.as_ref().map_or(1.0, |spindle| spindle.efficiency),
+        power_limit_kw: available.and_then(|of| of.power_kw),
+        torque_limit_n_m: available.and_then(|of| of.torque_n_m),
+        power_depth_mm,
+        torque_depth_mm,
+    }
+}
+
+/// The leading multiplier, and the share of each mode in its energy.
+fn multiplier(study: &Study<'_>) -> Result<(LeadingMultiplier, Option<Vec<f64>>), Failure> {
+    let cut = study.cut();
+    let unsolved = Failure::NotConverged { what: "largest Floquet multiplier", residual: 1.0, iterations: 0 };
+    let (found, modulus_error) = study.orders.with_error(&cut, study.monitor)?.ok_or(unsolved)?;
+    let shares = study.orders.shares(&cut, study.monitor)?;
+    let period_s = cut.rotation.period_s(cut.milling.period_rad());
+    let growth_per_s = found.growth() / period_s;
+    let aliases: Vec<FrequencyShare> = shares
+        .iter()
+        .flat_map(|shares| &shares.aliases)
+        .map(|alias| FrequencyShare { frequency_hz: alias.frequency_hz, share: alias.share })
+        .collect();
+    let told = LeadingMultiplier {
+        modulus: found.modulus(),
+        real: found.re,
+        imaginary: found.im.abs(),
+        kind: found.kind().into(),
+        period_s,
+        per_tooth: per_tooth(&found, study.teeth_per_period(&cut.rotation)),
+        growth_per_s,
+        settling_time_s: (growth_per_s < 0.0).then(|| DECAYED.ln() / growth_per_s),
+        modulus_error,
+        chatter_frequency_hz: aliases.first().map(|alias| alias.frequency_hz),
+        aliases,
+    };
+    Ok((told, shares.map(|shares| shares.energy)))
+}
+
+/// |mu| from tooth to tooth.
+fn per_tooth(found: &Multiplier, teeth: f64) -> f64 {
+    (found.growth() / teeth).exp()
+}
+
+fn modes(case: &Case, energy: Option<&[f64]>) -> Vec<ModeShare> {
+    let of = |(index, mode): (usize, &model::Mode)| ModeShare {
+        side: if mode.side == model::Side::Tool { YieldingSide::Tool } else { YieldingSide::Work },
+        x: mode.direction[0],
+        y: mode.direction[1],
+        z: mode.direction[2],
+        frequency_hz: mode.frequency_hz,
+        mass_kg: mode.mass_kg,
+        stiffness_n_per_mm: mode.stiffness_n_per_mm(),
+        damping_ratio: mode.damping_ratio,
+        energy_share: energy.and_then(|energy| energy.get(index).copied()),
+    };
+    case.structure.modes.iter().enumerate().map(of).collect()
+}
+
+fn intervals(seen: &Scan) -> Vec<UnstableInterval> {
+    let mut stretches = unstable(&seen.crossings);
+    // Unstable at the least depth and ever on.
+    if stretches.is_empty() && seen.first_mm().is_some() {
+        stretches.push(model::Unstable { from: None, to: None });
+    }
+    let of = |stretch: &model::Unstable| {
+        let known = stretch.from.or(stretch.to);
+        UnstableInterval {
+            from_mm: stretch.from.map(|at| at.depth_mm),
+            to_mm: stretch.to.map(|at| at.depth_mm),
+            kind: known.map_or(model::Kind::Hopf, |at| at.kind).into(),
+            from_low_mm: stretch.from.map(|at| at.bracket_mm[0]),
+            from_high_mm: stretch.from.map(|at| at.bracket_mm[1]),
+            to_low_mm: stretch.to.map(|at| at.bracket_mm[0]),
+            to_high_mm: stretch.to.map(|at| at.bracket_mm[1]),
+            certified: [stretch.from, stretch.to].into_iter().flatten().all(|at| at.certified),
+        }
+    };
+    stretches.iter().map(of).collect()
+}
+
+fn depth_line(study: &Study<'_>, seen: &Scan) -> DepthLine {
+    let teeth = study.teeth_per_period(&study.case.rotation);
+    let (depth_mm, per_tooth) = seen.curve.iter().map(|(depth, growth)| (*depth, (growth / teeth).exp())).unzip();
+    DepthLine { depth_mm, per_tooth }
+}
+
+/// The forced motion; none where there is no periodic one, or it goes beyond the model.
+fn motion(study: &Study<'_>, aside: &mut Aside) -> Result<Option<MillingMotion>, Failure> {
+    let cut = study.cut();
+    let Some(forced) = study.orders.forced(&cut, study.monitor)? else {
+        aside.no_motion = true;
+        return Ok(None);
+    };
+    let (low, high) = forced.extremes();
+    let swing = (0..3).map(|q| high[q] - low[q]).fold(0.0, f64::max);
+    if swing > MODEL_ENDS * cut.milling.radius_mm || !swing.is_finite() {
+        aside.beyond_mm = Some(swing);
+        return Ok(None);
+    }
+    let walls = forced.walls().into_iter().map(|wall| surface(&forced, wall, study.case.depth_mm)).collect();
+    let um = |mm: f64| mm * UM_PER_MM;
+    Ok(Some(MillingMotion {
+        x_min_um: um(low[0]),
+        x_max_um: um(high[0]),
+        y_min_um: um(low[1]),
+        y_max_um: um(high[1]),
+        z_min_um: um(low[2]),
+        z_max_um: um(high[2]),
+        peak_to_peak_um: um(swing),
+        walls,
+    }))
+}
+
+fn surface(forced: &model::Forced<'_>, wall: Wall, depth_mm: f64) -> WallSurface {
+    let height_mm: Vec<f64> = (0..=HEIGHTS).map(|k| depth_mm * f64::from(k) / f64::from(HEIGHTS)).collect();
+    let surface_error_um: Vec<f64> =
+        height_mm.iter().map(|height| UM_PER_MM * forced.surface_error_mm(wall, *height)).collect();
+    let roughness = forced.roughness(wall, 0.5 * depth_mm);
+    WallSurface {
+        wall: if wall == Wall::Up { WallSide::Up } else { WallSide::Down },
+        error_min_um: surface_error_um.iter().copied().fold(f64::INFINITY, f64::min),
+        error_max_um: surface_error_um.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        height_mm,
+        surface_error_um,
+        roughness_rz_um: UM_PER_MM * roughness.rz_mm,
+        roughness_ra_um: UM_PER_MM * roughness.ra_mm,
+    }
+}
+
+impl WallSurface {
+    /// The larger of both errors, without its sign.
+    pub(super) fn largest_um(&self) -> f64 {
+        self.error_max_um.abs().max(self.error_min_um.abs())
+    }
+}

@@ -1,0 +1,13 @@
+//! The job, what may stand in it, and the model that it means.
+
+mod case;
+mod check;
+mod input;
+
+pub(super) use case::{Case, N_MOST, range_rpm, varying};
+pub(super) use check::{CODES, modes};
+pub use input::{
+    Asked, Cut, CutLimits, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
+    MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,
+    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingVise,
+};

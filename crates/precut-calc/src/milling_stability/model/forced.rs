@@ -1,0 +1,218 @@
+//! The motion that the chips force on tool and work, and the surface that it leaves (`milling/4.20`).
+//!
+//! Linear about undisturbed chips. Where all teeth are alike every one repeats it and no wave is left: modes under a known
+//! force. Else what earlier teeth left acts as well, and the motion is the fixed point of an affine map over a turn.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::calculator::{Failure, Monitor, Pace};
+use crate::num::dde::Rule;
+use crate::num::gmres::gmres;
+
+use super::cutter::Vector;
+use super::map::{Acting, Cut, Map};
+use super::multiplier::POINTS;
+
+/// Residual of the fixed point, and the largest that is a motion at all.
+const TOLERANCE: f64 = 1e-13;
+const ACCEPTED: f64 = 1e-7;
+/// Applications at most.
+const APPLICATIONS: usize = 400;
+/// Samples of an element between two ends.
+const SAMPLES: u32 = 24;
+/// Samples of the profile of a wall over a feed per turn.
+const PROFILE: u32 = 2000;
+/// An angle this near to 0 or pi is a tooth that leaves a wall.
+const WALL_RAD: f64 = 1e-9;
+
+/// A wall that the cutter leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wall {
+    /// At phi = 0, toward +y: teeth begin there.
+    Up,
+    /// At phi = pi, toward -y: teeth end there.
+    Down,
+}
+
+/// Of the profile that all teeth leave along the feed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roughness {
+    /// Peak to valley, mm.
+    pub rz_mm: f64,
+    /// Mean deviation from the mean line, mm.
+    pub ra_mm: f64,
+}
+
+/// A periodic motion of the tool against the work.
+#[derive(Debug)]
+pub struct Forced<'a> {
+    cut: &'a Cut<'a>,
+    rule: &'a Rule<POINTS>,
+    times: Vec<f64>,
+    /// Per element, point by point, in the basis.
+    motion: Vec<Vec<f64>>,
+}
+
+pub(super) fn forced<'a>(
+    cut: &'a Cut<'a>,
+    rule: &'a Rule<POINTS>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Forced<'a>>, Failure> {
+    let repeats = cut.milling.teeth_are_alike() && !cut.rotation.varies();
+    let acting = if repeats { Acting::Force } else { Acting::WavesAndForce };
+    let Some(map) = Map::of(cut, rule, acting, monitor)? else { return Ok(None) };
+    let mut pace = Pace::new(monitor);
+    let mut pushed = vec![0.0; map.dimension()];
+    map.apply(&mut pushed);
+    let left = |vector: &[f64]| -> Result<Vec<f64>, Failure> {
+        let mut moved = vector.to_vec();
+        map.apply(&mut moved);
+        pace.work(map.work())?;
+        Ok(vector.iter().zip(&moved).zip(&pushed).map(|((v, m), c)| v - (m - c)).collect())
+    };
+    let found = gmres(&pushed, TOLERANCE, APPLICATIONS, left)?;
+    if found.residual.is_nan() || found.residual > ACCEPTED {
+        return Ok(None);
+    }
+    let mut motion = Vec::with_capacity(map.times.len());
+    let mut state = found.x;
+    map.apply_seen(&mut state, |element, force, q| motion.push(map.motion(element, force, q)));
+    Ok(Some(Forced { cut, rule, times: map.times, motion }))
+}
+
+impl Forced<'_> {
+    fn period_s(&self) -> f64 {
+        self.times[self.times.len() - 1]
+    }
+
+    fn inside(&self, element: usize, share: f64) -> Vector {
+        let basis = &self.cut.structure.basis;
+        let d = basis.len();
+        let mut at = [0.0; 3];
+        for (i, weight) in self.rule.weights_at(share).iter().enumerate() {
+            for (b, direction) in basis.iter().enumerate() {
+                for (sum, along) in at.iter_mut().zip(direction) {
+                    *sum += weight * self.motion[element][i * d + b] * along;
+                }
+            }
+        }
+        at
+    }
+
+    /// Tool minus work at a time, mm.
+    pub fn at(&self, time_s: f64) -> Vector {
+        let time = time_s.rem_euclid(self.period_s());
+        let element = (self.times.partition_point(|t| *t <= time).max(1) - 1).min(self.times.len() - 2);
+        let share = (time - self.times[element]) / (self.times[element + 1] - self.times[element]);
+        self.inside(element, share)
+    }
+
+    /// Least and largest of each direction, mm.
+    pub fn extremes(&self) -> (Vector, Vector) {
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        for q in 0..3 {
+            low[q] = -self.largest(|at| -at[q]);
+            high[q] = self.largest(|at| at[q]);
+        }
+        (low, high)
+    }
+
+    /// The largest value of something of the motion: the best of the samples, refined beside it.
+    fn largest(&self, of: impl Fn(&Vector) -> f64) -> f64 {
+        let at = |element: usize, step: f64| of(&self.inside(element, step / f64::from(SAMPLES)));
+        let mut best = (f64::NEG_INFINITY, 0, 0.0);
+        for element in 0..self.motion.len() {
+            for step in (0..=SAMPLES).map(f64::from) {
+                let value = at(element, step);
+                if value > best.0 {
+                    best = (value, element, step);
+                }
+            }
+        }
+        let (value, element, step) = best;
+        let (from, to) = ((step - 1.0).max(0.0), (step + 1.0).min(f64::from(SAMPLES)));
+        value.max(golden(from, to, |step| at(element, step)))
+    }
+
+    /// The walls that the cutter leaves: none where its teeth begin and end inside the work.
+    pub fn walls(&self) -> Vec<Wall> {
+        let milling = self.cut.milling;
+        let up = (milling.entry_rad.abs() < WALL_RAD).then_some(Wall::Up);
+        let down = ((milling.exit_rad - PI).abs() < WALL_RAD).then_some(Wall::Down);
+        up.into_iter().chain(down).collect()
+    }
+
+    /// When a tooth stands at a wall with a height of its edge.
+    fn leaves_s(&self, tooth: usize, wall: Wall, height_mm: f64) -> f64 {
+        let milling = self.cut.milling;
+        let angle = if wall == Wall::Up { 0.0 } else { PI };
+        let rotation = angle + milling.behind_rad(tooth) + milling.teeth[tooth].lag_rad_per_mm * height_mm;
+        self.cut.rotation.time_s(rotation.rem_euclid(TAU))
+    }
+
+    /// How far a tooth cuts beyond a wall at a height, mm.
+    fn beyond_mm(&self, tooth: usize, wall: Wall, height_mm: f64) -> f64 {
+        let y = self.at(self.leaves_s(tooth, wall, height_mm))[1];
+        if wall == Wall::Up { y } else { -y }
+    }
+
+    fn teeth(&self) -> std::ops::Range<usize> {
+        0..if self.cut.milling.teeth_are_alike() { 1 } else { self.cut.milling.teeth.len() }
+    }
+
+    /// Error of a wall at a height: positive where too much is removed. The tooth that cuts farthest makes the wall.
+    pub fn surface_error_mm(&self, wall: Wall, height_mm: f64) -> f64 {
+        let own = |tooth: usize| self.cut.milling.teeth[tooth].radial_mm + self.beyond_mm(tooth, wall, height_mm);
+        self.teeth().map(own).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Least and largest motion along the spindle while anything is cut, mm: the error of the floor.
+    pub fn floor_mm(&self) -> (f64, f64) {
+        let (low, high) = self.extremes();
+        (low[2], high[2])
+    }
+
+    /// Of a wall at a height: the envelope of all arcs over a feed per turn.
+    pub fn roughness(&self, wall: Wall, height_mm: f64) -> Roughness {
+        let milling = self.cut.milling;
+        let feed_per_turn = milling.feed_mm * milling.teeth.len() as f64;
+        let all = 0..milling.teeth.len();
+        // Where along the feed the centre stands when a tooth leaves the wall, how far it cuts, and its radius.
+        let arcs: Vec<(f64, f64, f64)> = all
+            .map(|tooth| {
+                let turned = self.cut.rotation.rotation_rad(self.leaves_s(tooth, wall, height_mm)) / TAU;
+                let offset = milling.teeth[tooth].radial_mm;
+                (turned * feed_per_turn, offset + self.beyond_mm(tooth, wall, height_mm), milling.radius_mm + offset)
+            })
+            .collect();
+        // The deepest arc of the tooth itself and of its neighbours in the turns before and after.
+        let depth = |x: f64| {
+            let of = |(centre, top, radius): &(f64, f64, f64)| {
+                let away = (x - centre + 0.5 * feed_per_turn).rem_euclid(feed_per_turn) - 0.5 * feed_per_turn;
+                top - away * away / (radius + (radius * radius - away * away).max(0.0).sqrt())
+            };
+            arcs.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let values: Vec<f64> = (0..PROFILE).map(|k| depth(feed_per_turn * f64::from(k) / f64::from(PROFILE))).collect();
+        let mean = values.iter().sum::<f64>() / f64::from(PROFILE);
+        // A valley lies where a centre stands, a peak where two arcs meet, beside the least sample.
+        let deepest = arcs.iter().map(|(centre, ..)| depth(*centre)).fold(f64::NEG_INFINITY, f64::max);
+        let least = (0..values.len()).min_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0) as f64;
+        let step = feed_per_turn / f64::from(PROFILE);
+        let highest = -golden((least - 1.0) * step, (least + 1.0) * step, |x| -depth(x));
+        Roughness {
+            rz_mm: deepest - highest,
+            ra_mm: values.iter().map(|value| (value - mean).abs()).sum::<f64>() / f64::from(PROFILE),
+        }
+    }
+}
+
+/// The largest value between two places with one maximum, by the golden section.
+fn golden(mut from: f64, mut to: f64, of: impl Fn(f64) -> f64) -> f64 {
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    for _ in 0..50 {
+        let (p, q) = (to - SHARE * (to - from), from + SHARE * (to - from));
+        if of(p) < of(q) { from = p } else { to = q }
+    }
+    of(0.5 * (from + to))
+}
