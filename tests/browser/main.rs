@@ -17,6 +17,7 @@ mod jobs;
 mod keys;
 mod matrix;
 mod offers;
+mod programs;
 mod records;
 mod rooms;
 mod screenshots;

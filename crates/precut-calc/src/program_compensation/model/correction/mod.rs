@@ -21,6 +21,7 @@ use super::reader::Program;
 use super::stock::{Part, Stroke, Turned, lines_that_finish, strokes};
 use super::yielding::{Driven, Yielded, yielding};
 
+pub(crate) use diff::unified;
 pub(crate) use plan::LeftAlone;
 pub use plan::WhyLeftAlone;
 pub(crate) use proof::{FAILURE_CODES, Proof, Transition};
@@ -110,7 +111,7 @@ pub(crate) fn corrected(
             proof: None,
         });
     };
-    let diff = diff::unified(&job.nc_program, &written.changed);
+    let diff = unified(&job.nc_program, &written.changed);
     let undersize = undersize(&before.nominal, &planned.real, &written.changed);
     let Written { text, changed, .. } = written;
     Ok(Corrected { text, changed, left_alone, diff, undersize, proof: Some(proof) })
