@@ -20,7 +20,7 @@ pub(crate) fn returned(job: &Job, compensation: &CompensatedProgram, made_by: &s
         let stamp = stamp(job.dialect, &compensation.changes, made_by);
         let (line, end) = head(&job.nc_program, job.dialect);
         text = stamped(&text, line, end, &stamp);
-        diff = unified(&job.nc_program, &with_stamp(&job.nc_program, &compensation.changes, line, stamp));
+        diff = unified(&job.nc_program, &with_stamp(&job.nc_program, &compensation.changes, line, &stamp));
     }
     ReturnedProgram { text, diff, encoding: job.reading.encoding, dialect: job.dialect }
 }
@@ -40,7 +40,7 @@ fn stamp(dialect: Dialect, changes: &[LineChange], made_by: &str) -> String {
 }
 
 /// Behind how many lines of a program its body begins (its sign, its name), and how its lines end.
-fn head<'t>(text: &'t str, dialect: Dialect) -> (usize, &'t str) {
+fn head(text: &str, dialect: Dialect) -> (usize, &str) {
     let lines = lines_of_text(text);
     let shown = |line: &Range<usize>| text[line.clone()].trim_matches(['\u{feff}', ' ', '\t']);
     let is_sign = |line: &&Range<usize>| dialect != Dialect::Siemens && shown(line).starts_with('%');
@@ -66,7 +66,7 @@ fn stamped(text: &str, behind: usize, end: &str, stamp: &str) -> String {
 }
 
 /// The changes with the line that is put in.
-fn with_stamp(text: &str, changes: &[LineChange], behind: usize, stamp: String) -> Vec<ChangedLine> {
+fn with_stamp(text: &str, changes: &[LineChange], behind: usize, stamp: &str) -> Vec<ChangedLine> {
     let mut changed: Vec<ChangedLine> = changes
         .iter()
         .map(|one| ChangedLine {
@@ -84,13 +84,13 @@ fn with_stamp(text: &str, changes: &[LineChange], behind: usize, stamp: String) 
     }
     for one in changed.iter_mut().filter(|one| one.line == line) {
         if behind > 0 {
-            one.new.push(stamp.clone());
+            one.new.push(stamp.to_owned());
         } else if let Some(first) = one.new.first_mut().filter(|first| first.starts_with('\u{feff}')) {
             let rest = first.split_off('\u{feff}'.len_utf8());
-            first.push_str(&stamp);
+            first.push_str(stamp);
             one.new.insert(1, rest);
         } else {
-            one.new.insert(0, stamp.clone());
+            one.new.insert(0, stamp.to_owned());
         }
     }
     changed
