@@ -36,7 +36,7 @@ pub(crate) use names::takes as takes_names;
 pub(crate) use nearest::nearest;
 #[cfg(test)]
 pub(crate) use place::FreeColumns;
-pub(crate) use place::{CellKind, Step, TableColumn, TablePlace};
+pub(crate) use place::{CellKind, Step, TableColumn, TablePlace, TextPlace};
 pub(crate) use result_text::{Unwritable, append as append_result};
 pub(crate) use shape::Shape;
 pub(crate) use watched::{NotReplayed, Observed, Replayed, Watching};

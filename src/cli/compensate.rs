@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use bytes::Bytes;
 use clap::Args;
 use precut_calc::calculator::Unwatched;
 use precut_calc::program_compensation::Outcome;
@@ -11,12 +12,14 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::{Failed, exit_code, job, print};
-use crate::engine::{Body, Error, Given, solve_with};
+use crate::engine::{Body, Error, FilePart, Given, solve_with};
 use crate::http::{Media, Problem, written};
 use crate::registry::Registry;
 use crate::text::Language;
 
 const CALCULATOR: &str = "program-compensation";
+/// What a diff begins with.
+const HEADS: &[u8] = b"--- given\n+++ corrected\n";
 /// Nothing had to change.
 const UNCHANGED: u8 = 3;
 /// The program or the job is at fault, or is not understood.
@@ -86,16 +89,16 @@ impl CompensateArgs {
 /// Runs the command; the exit code says whether anything changed.
 pub(super) fn run(arguments: &CompensateArgs, registry: &Registry, language: Language) -> Result<ExitCode, Failed> {
     let target = arguments.target()?;
-    let bytes = read(&arguments.program)?;
-    let (text, is_utf8) = decoded(bytes);
-    let body = body(&arguments.job, &text)?;
+    let program = FilePart { name: "nc_program".to_owned(), bytes: read(&arguments.program)?.into() };
+    let body = Body::Parts { job: job_without_program(&arguments.job)?, files: vec![program] };
     let library = arguments.library.as_ref().map(|file| job::library_file(file)).transpose()?;
     let given = Given { library, ..Given::default() };
-    let answer = match solve_with(registry, CALCULATOR, body, &given, &Unwatched) {
-        Ok(stored) => written(&stored, Media::Json, None, language)?,
+    let stored = match solve_with(registry, CALCULATOR, body, &given, &Unwatched) {
+        Ok(stored) => stored,
         Err(error) => return Ok(refused(error, &arguments.program, language)),
     };
-    let answer: Answer = serde_json::from_slice(&answer).map_err(|error| Failed::Machine(error.to_string()))?;
+    let answer: Answer =
+        serde_json::from_slice(&stored.body_in(language)).map_err(|error| Failed::Machine(error.to_string()))?;
     for warning in &answer.warnings {
         tell(&arguments.program, warning);
     }
@@ -104,12 +107,16 @@ pub(super) fn run(arguments: &CompensateArgs, registry: &Registry, language: Lan
         let _ = writeln!(std::io::stderr(), "{}", said.detail);
     }
     if let Some(target) = target {
-        std::fs::write(target, encoded(&compensation.nc_program, is_utf8))
+        std::fs::write(target, written(&stored, Media::Gcode, None, language)?)
             .map_err(|error| Failed::Machine(job::named(target, &error)))?;
     }
     let named = target.unwrap_or(&arguments.program);
-    let diff = compensation.diff.replacen("--- given\n+++ corrected\n", &heads(&arguments.program, named), 1);
-    print(&encoded(&diff, is_utf8))?;
+    let diff = written(&stored, Media::Diff, None, language)?;
+    // A diff without its heads has not changed.
+    if let Some(changes) = diff.strip_prefix(HEADS) {
+        print(heads(&arguments.program, named).as_bytes())?;
+        print(changes)?;
+    }
     Ok(if compensation.lines_changed.is_empty() { ExitCode::from(UNCHANGED) } else { ExitCode::SUCCESS })
 }
 
@@ -121,8 +128,8 @@ fn read(path: &Path) -> Result<Vec<u8>, Failed> {
     std::fs::read(path).map_err(|error| Failed::Machine(job::named(path, &error)))
 }
 
-/// The job with the program in it.
-fn body(path: &Path, text: &str) -> Result<Body, Failed> {
+/// The job that takes the program.
+fn job_without_program(path: &Path) -> Result<Bytes, Failed> {
     let no_job = |what: &str| Failed::Usage(format!("{}: {what}", path.display()));
     let mut job: Value = serde_json::from_slice(&read(path)?).map_err(|error| no_job(&error.to_string()))?;
     if job.get("job").is_some() {
@@ -132,28 +139,12 @@ fn body(path: &Path, text: &str) -> Result<Body, Failed> {
         job = job["job"].take();
     }
     let Some(fields) = job.as_object_mut() else { return Err(no_job("a job is an object")) };
-    fields.insert("nc_program".to_owned(), json!(text));
+    fields.remove("nc_program");
     let mode = fields.entry("mode").or_insert_with(|| json!({}));
     if let Some(mode) = mode.as_object_mut() {
         mode.insert("kind".to_owned(), json!("compensate"));
     }
-    Ok(Body::Json(job.to_string().into()))
-}
-
-/// UTF-8 where it is that, else every byte a character of Latin-1.
-fn decoded(bytes: Vec<u8>) -> (String, bool) {
-    match String::from_utf8(bytes) {
-        Ok(text) => (text, true),
-        Err(error) => (error.as_bytes().iter().copied().map(char::from).collect(), false),
-    }
-}
-
-/// The bytes as they came. What is written anew is ASCII.
-fn encoded(text: &str, is_utf8: bool) -> Vec<u8> {
-    if is_utf8 {
-        return text.as_bytes().to_vec();
-    }
-    text.chars().map(|character| u8::try_from(character).unwrap_or(b'?')).collect()
+    Ok(job.to_string().into())
 }
 
 /// To standard error, with the place in the program.
@@ -178,17 +169,4 @@ fn refused(error: Error, program: &Path, language: Language) -> ExitCode {
     }
     let is_read = problem.code() != "program_not_read" && exit_code(&problem) != NOT_READ;
     ExitCode::from(if is_read { REFUSED } else { NOT_READ })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bytes_come_back_as_they_were() {
-        for bytes in [&b"G1 X20. (K\xF6rper)\r\n"[..], "G1 X20. (Körper)\n".as_bytes(), b"\xEF\xBB\xBFG0\r"] {
-            let (text, is_utf8) = decoded(bytes.to_vec());
-            assert_eq!(encoded(&text, is_utf8), bytes);
-        }
-    }
 }

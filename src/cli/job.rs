@@ -12,7 +12,7 @@ use serde_json::value::RawValue;
 
 use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
 use crate::engine::{
-    Body, Error, Form as FileForm, Given, Library, ModelFile, NotGiven, STUDIES, SyntaxFault, TablePart, check_with,
+    Body, Error, FilePart, Form as FileForm, Given, Library, ModelFile, NotGiven, STUDIES, SyntaxFault, check_with,
     solve_with,
 };
 use crate::http::{Media, Problem, written};
@@ -30,6 +30,8 @@ pub(super) enum Form {
     Svg,
     /// Its program for the machine
     Gcode,
+    /// What changed in the program of its job
+    Diff,
     /// Its inputs and all of its tables as a workbook
     Xlsx,
     /// All of it as a report on paper
@@ -43,6 +45,7 @@ impl From<Form> for Media {
             Form::Csv => Self::Csv,
             Form::Svg => Self::Svg,
             Form::Gcode => Self::Gcode,
+            Form::Diff => Self::Diff,
             Form::Xlsx => Self::Xlsx,
             Form::Pdf => Self::Pdf,
         }
@@ -55,14 +58,18 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
     let part = match arguments.format {
         Form::Csv => arguments.table.as_deref(),
         Form::Svg => arguments.figure.as_deref(),
-        Form::Json | Form::Gcode | Form::Xlsx | Form::Pdf => None,
+        Form::Json | Form::Gcode | Form::Diff | Form::Xlsx | Form::Pdf => None,
     };
     let stored = solve_with(registry, &calculator, body, &given, &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
         // A byte more would be a fault of the file.
-        None if bytes.ends_with(b"\n") || matches!(arguments.format, Form::Xlsx | Form::Pdf) => print(&bytes),
+        None if bytes.ends_with(b"\n")
+            || matches!(arguments.format, Form::Gcode | Form::Diff | Form::Xlsx | Form::Pdf) =>
+        {
+            print(&bytes)
+        }
         None => print(&bytes).and_then(|()| print(b"\n")),
     }
 }
@@ -124,8 +131,8 @@ fn read(arguments: &JobArgs, registry: &Registry) -> Result<(String, Body, Given
         Body::Json(job)
     } else {
         let names = entry(registry, &calculator)?.table_names();
-        let tables = arguments.measured.iter().map(|given| table(given, &calculator, &names));
-        Body::Parts { job, tables: tables.collect::<Result<_, _>>()? }
+        let files = arguments.measured.iter().map(|given| table(given, &calculator, &names));
+        Body::Parts { job, files: files.collect::<Result<_, _>>()? }
     };
     let model = arguments.model.as_ref().map(|file| model_file(file, registry)).transpose()?;
     let library = arguments.library.as_ref().map(|file| library_file(file)).transpose()?;
@@ -163,7 +170,7 @@ fn model_file(path: &Path, registry: &Registry) -> Result<ModelFile, Failed> {
 const MEASUREMENTS: &str = "measurements";
 
 /// A measured table from `FILE`: the only one of the job, else its measurements; from `FIELD=FILE` any.
-fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, Failed> {
+fn table(given: &str, calculator: &str, names: &[String]) -> Result<FilePart, Failed> {
     let (name, path) = match given.split_once('=').filter(|(name, _)| names.iter().any(|known| is_field(known, name))) {
         Some((name, path)) => (name.to_owned(), Path::new(path)),
         None => match names {
@@ -179,8 +186,8 @@ fn table(given: &str, calculator: &str, names: &[String]) -> Result<TablePart, F
             }
         },
     };
-    let text = std::fs::read(path).map_err(|error| Failed::Machine(named(path, &error)))?;
-    Ok(TablePart { name, text: text.into() })
+    let bytes = std::fs::read(path).map_err(|error| Failed::Machine(named(path, &error)))?;
+    Ok(FilePart { name, bytes: bytes.into() })
 }
 
 /// Whether the name of a table is this one, or ends with it.

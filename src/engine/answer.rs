@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use precut_calc::calculator::{Cost, Figure, Place, Program, Table};
+use precut_calc::calculator::{Cost, Figure, Place, Program, ReturnedProgram, Table};
 use serde_json::Value;
 
 use super::error::Error;
@@ -20,12 +20,12 @@ use crate::text::{Language, Mark};
 pub enum Body {
     /// As JSON.
     Json(Bytes),
-    /// As JSON with measured tables beside it.
+    /// As JSON with files beside it.
     Parts {
         /// The job.
         job: Bytes,
-        /// Its tables.
-        tables: Vec<TablePart>,
+        /// Its measured tables and long texts.
+        files: Vec<FilePart>,
     },
 }
 
@@ -34,18 +34,18 @@ impl Body {
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Json(job) => job.len(),
-            Self::Parts { job, tables } => job.len() + tables.iter().map(|table| table.text.len()).sum::<usize>(),
+            Self::Parts { job, files } => job.len() + files.iter().map(|file| file.bytes.len()).sum::<usize>(),
         }
     }
 }
 
-/// A measured table as a file beside the job.
+/// A measured table, or a long text, as a file beside the job.
 #[derive(Debug, Clone)]
-pub struct TablePart {
+pub struct FilePart {
     /// Name of the field: its last part or all of it with dots.
     pub name: String,
-    /// The CSV.
-    pub text: Bytes,
+    /// The CSV, or the text as it is.
+    pub bytes: Bytes,
 }
 
 /// A job that could run.
@@ -178,6 +178,13 @@ impl Stored {
             change(&mut job, &moved.before, &moved.after);
         }
         Ok(job)
+    }
+    /// The program that its job brought along, as it is given back: `None` if jobs of the calculator bring none, `Err` if this
+    /// answer has none.
+    pub fn returned(&self) -> Result<Option<ReturnedProgram>, Error> {
+        let made_by = format!("precut {} result {}", self.said("engine").unwrap_or_default(), self.key);
+        let returned = self.entry.returned(&self.own_input(), &self.body, &made_by).map_err(outdated)?;
+        returned.transpose().map_err(Error::Calculation)
     }
     /// Its program for the machine: `None` if the calculator has none, `Err` if this answer has none.
     pub fn program(&self) -> Result<Option<Program>, Error> {

@@ -85,11 +85,11 @@ pub(crate) fn fingerprint_with(calculator: &str, body: &Body, told: Option<&str>
     part(calculator.as_bytes());
     match body {
         Body::Json(job) => part(job),
-        Body::Parts { job, tables } => {
+        Body::Parts { job, files } => {
             part(job);
-            for table in tables {
-                part(table.name.as_bytes());
-                part(&table.text);
+            for file in files {
+                part(file.name.as_bytes());
+                part(&file.bytes);
             }
         }
     }

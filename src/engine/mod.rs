@@ -32,13 +32,14 @@ mod summary;
 mod table;
 #[cfg(test)]
 mod tests;
+mod text_file;
 mod watch;
 
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
 pub use crate::store::callbacks::{Callback, CallbackState, DueCallback, NewCallback, TakeUp, Tried};
 pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
-pub use answer::{Body, CacheState, Checked, Solved, Stored, TablePart, Timings};
+pub use answer::{Body, CacheState, Checked, FilePart, Solved, Stored, Timings};
 pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
 pub use jobs::{Answered, Ask, Feed, Isolation, Job};
@@ -357,8 +358,8 @@ impl Inner {
     fn room_for(&self, body: &Body) -> Room {
         let paid = match body {
             Body::Json(job) => paid_beside(job.len()),
-            Body::Parts { job, tables } => {
-                paid_beside(job.len()) + tables.iter().map(|table| paid_beside(table.text.len())).sum::<usize>()
+            Body::Parts { job, files } => {
+                paid_beside(job.len()) + files.iter().map(|file| paid_beside(file.bytes.len())).sum::<usize>()
             }
         };
         Room::of(&self.bodies, paid)

@@ -11,7 +11,7 @@ use super::error::Error;
 use super::json::{Parsed, ParsedHead};
 use super::model::{self, Held};
 use super::names::{self, Asks, Drawn, Names};
-use super::{Body, Checked, TablePart, json, study, table};
+use super::{Body, Checked, FilePart, json, study, table, text_file};
 use crate::key::Key;
 use crate::registry::{Entry, Faults, Prepared, Registry, Shape, Unprepared, by_pointer};
 use crate::store::documents::KeptDocument;
@@ -106,7 +106,7 @@ impl Draft {
     pub(crate) fn read(self, entry: &Arc<Entry>, body: &Body, names: &Names<'_>) -> Result<Ready, Error> {
         let parts = match body {
             Body::Json(_) => [].as_slice(),
-            Body::Parts { tables, .. } => tables.as_slice(),
+            Body::Parts { files, .. } => files.as_slice(),
         };
         let Some(beyond) = self.beyond else { return read_named(entry, self.job, (parts, self.left_out), names) };
         held_to_schema(entry, self.job, (parts, self.left_out, beyond), names)?;
@@ -137,7 +137,7 @@ pub(crate) fn read_point(entry: &Arc<Entry>, mut job: Value, found: &names::Foun
 pub(crate) fn read_named(
     entry: &Arc<Entry>,
     mut job: Value,
-    (parts, left_out): (&[TablePart], usize),
+    (parts, left_out): (&[FilePart], usize),
     names: &Names<'_>,
 ) -> Result<Ready, Error> {
     let names_any = names::names_any(names.registry, entry, &mut job);
@@ -150,7 +150,7 @@ pub(crate) fn read_named(
 fn held_to_schema(
     entry: &Arc<Entry>,
     job: Value,
-    (parts, left_out, beyond): (&[TablePart], usize, Faults),
+    (parts, left_out, beyond): (&[FilePart], usize, Faults),
     names: &Names<'_>,
 ) -> Result<(), Error> {
     let Resolved { mut job, of_names, of_model, .. } = Resolved::of(entry, job, names);
@@ -187,7 +187,7 @@ impl<'a> Resolved<'a> {
 fn read_resolved(
     entry: &Arc<Entry>,
     resolved: Resolved<'_>,
-    (parts, room): (&[TablePart], &Room),
+    (parts, room): (&[FilePart], &Room),
     left_out: usize,
 ) -> Result<Ready, Error> {
     let Resolved { mut job, drawn, enclosed, of_names, of_model } = resolved;
@@ -356,10 +356,12 @@ fn general_code(finding: &Finding) -> &str {
     }
 }
 
-fn check_schema(entry: &Entry, job: &mut Value, (parts, room): (&[TablePart], &Room)) -> Result<(), Found> {
+fn check_schema(entry: &Entry, job: &mut Value, (parts, room): (&[FilePart], &Room)) -> Result<(), Found> {
     let mut table_faults = Faults::default();
+    let texts = entry.texts_of(job).to_vec();
+    let (parts, unread) = text_file::resolve(job, parts, &texts, &mut table_faults);
     let places = entry.tables_of(job).to_vec();
-    let tables = table::resolve(job, (parts, room), &places, &mut table_faults);
+    let tables = table::resolve(job, (&parts, room), &places, &mut table_faults).with_unread(unread);
     let mut schema_faults = Faults::default();
     // A resolved model is in order.
     let (plain, held) = model::split(entry, job);
@@ -494,8 +496,8 @@ mod tests {
         let rows = with("measurements", json!([{"z_mm": 10, "deviation_um": 12}]));
         let text = "z [cm];deviation_mm\n1;0,012\n";
         assert_eq!(key(&rows), key(&with("measurements", json!({ "csv": text }))));
-        let part = TablePart { name: "measurements".to_owned(), text: text.into() };
-        let parts = Body::Parts { job: plain().to_string().into(), tables: vec![part] };
+        let part = FilePart { name: "measurements".to_owned(), bytes: text.into() };
+        let parts = Body::Parts { job: plain().to_string().into(), files: vec![part] };
         let ready = read(&toy(), &parts).unwrap();
         assert_eq!(ready.key, key(&rows));
         assert_eq!(ready.echo().unwrap()["measurements"]["rows"], 1);

@@ -5,7 +5,7 @@ use precut_calc::calculator::Finding;
 use serde_json::{Map, Value, json};
 
 use super::budget::Room;
-use super::{TablePart, csv_table};
+use super::{FilePart, csv_table};
 use crate::registry::{Faults, Step, TablePlace, child, nearest};
 
 /// Where the rows of a table stood in its text, for faults found later.
@@ -25,7 +25,7 @@ pub(crate) struct Tables {
 /// Puts rows in the place of CSV. What cannot be read becomes null.
 pub(crate) fn resolve(
     job: &mut Value,
-    (parts, room): (&[TablePart], &Room),
+    (parts, room): (&[&FilePart], &Room),
     places: &[TablePlace],
     faults: &mut Faults,
 ) -> Tables {
@@ -36,7 +36,7 @@ pub(crate) fn resolve(
         }
     }
     for place in places {
-        each_at(job, &place.path, String::new(), &mut |value, pointer| {
+        each_at(job, &place.way.0, String::new(), &mut |value, pointer| {
             let Some(text) = csv_text(value) else { return };
             if let Some(read) = csv_table::read(&text, place, (&pointer, room), faults) {
                 tables.sources.push(CsvSource { pointer, lines: read.lines });
@@ -51,6 +51,12 @@ pub(crate) fn resolve(
 }
 
 impl Tables {
+    /// The same with more that could not be read.
+    pub(crate) fn with_unread(mut self, more: Vec<String>) -> Self {
+        self.unread.extend(more);
+        self
+    }
+
     /// Whether a fault concerns a table that could not be read anyway.
     pub(crate) fn is_noise(&self, finding: &Finding) -> bool {
         self.unread.contains(&finding.pointer)
@@ -80,7 +86,7 @@ impl Tables {
 /// The job as it is echoed: tables as row count and hash.
 pub(crate) fn without_rows(mut input: Value, places: &[TablePlace]) -> Value {
     for place in places {
-        each_at(&mut input, &place.path, String::new(), &mut |value, _| {
+        each_at(&mut input, &place.way.0, String::new(), &mut |value, _| {
             if let Value::Array(rows) = value {
                 let canonical = serde_json_canonicalizer::to_vec(rows).expect("rows are JSON with text keys");
                 let hash = blake3::hash(&canonical).to_hex();
@@ -103,7 +109,7 @@ pub(crate) fn has_rows(job: &Value, places: &[TablePlace]) -> bool {
             _ => false,
         }
     }
-    places.iter().any(|place| any_at(job, &place.path))
+    places.iter().any(|place| any_at(job, &place.way.0))
 }
 
 /// Runs `visit` on every value at `path`.
@@ -134,11 +140,11 @@ fn csv_text(value: &mut Value) -> Option<String> {
 }
 
 /// Puts the text of a file part where its name says.
-fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Result<(), Finding> {
-    let mut fitting = places.iter().filter_map(|place| fit(place, &part.name));
+fn place_part(job: &mut Value, part: &FilePart, places: &[TablePlace]) -> Result<(), Finding> {
+    let mut fitting = places.iter().filter_map(|place| place.way.fit(&part.name));
     let name = || part.name.clone();
     let Some(path) = fitting.next() else {
-        let names: Vec<String> = places.iter().map(TablePlace::dotted).collect();
+        let names: Vec<String> = places.iter().map(|place| place.way.dotted()).collect();
         let finding = Finding::new("unknown_table", meant(&part.name)).with("name", name());
         let near = nearest(&part.name, names.iter().map(String::as_str)).map(str::to_owned);
         return Err(match near {
@@ -146,54 +152,50 @@ fn place_part(job: &mut Value, part: &TablePart, places: &[TablePlace]) -> Resul
             None => finding.with("allowed", names),
         });
     };
-    let pointer = path.iter().fold(String::new(), |pointer, step| child(&pointer, step));
     if fitting.next().is_some() {
         return Err(Finding::new("ambiguous_table", meant(&part.name)).with("name", name()));
     }
-    let Ok(text) = std::str::from_utf8(&part.text) else {
-        return Err(Finding::new("table_not_utf8", pointer).with("name", name()));
+    let Ok(text) = std::str::from_utf8(&part.bytes) else {
+        return Err(Finding::new("table_not_utf8", pointer_of(&path)).with("name", name()));
     };
-    let mut target = job;
-    for step in &path {
-        let inner = match target {
+    put(job, &path, &part.name, json!({ "csv": text }))
+}
+
+/// The pointer of a way.
+pub(super) fn pointer_of(path: &[String]) -> String {
+    path.iter().fold(String::new(), |pointer, step| child(&pointer, step))
+}
+
+/// Puts what came as a file where nothing stands yet.
+pub(super) fn put(job: &mut Value, path: &[String], name: &str, value: Value) -> Result<(), Finding> {
+    let refused = |code| Err(Finding::new(code, pointer_of(path)).with("name", name.to_owned()));
+    match place_at(job, path) {
+        None => refused("no_place_for_table"),
+        Some(target) if !target.is_null() => refused("table_given_twice"),
+        Some(target) => {
+            *target = value;
+            Ok(())
+        }
+    }
+}
+
+/// The value at the end of a way, with the objects on it that are not there yet; `None` where something else stands on it.
+pub(super) fn place_at<'j>(job: &'j mut Value, path: &[String]) -> Option<&'j mut Value> {
+    path.iter().try_fold(job, |value, step| {
+        if value.is_null() {
+            *value = Value::Object(Map::new());
+        }
+        match value {
             Value::Object(map) => Some(map.entry(step.as_str()).or_insert(Value::Null)),
             Value::Array(items) => step.parse::<usize>().ok().and_then(|index| items.get_mut(index)),
-            Value::Null => {
-                *target = Value::Object(Map::new());
-                target.as_object_mut().map(|map| map.entry(step.as_str()).or_insert(Value::Null))
-            }
             _ => None,
-        };
-        let Some(inner) = inner else {
-            return Err(Finding::new("no_place_for_table", pointer).with("name", name()));
-        };
-        target = inner;
-    }
-    if !target.is_null() {
-        return Err(Finding::new("table_given_twice", pointer).with("name", name()));
-    }
-    *target = json!({ "csv": text });
-    Ok(())
+        }
+    })
 }
 
 /// Where a part with this name would stand in the job.
 fn meant(name: &str) -> String {
     name.split('.').fold(String::new(), |pointer, step| child(&pointer, step))
-}
-
-/// The way to the place that the name of a part means: the last name, or all names and indices with dots.
-fn fit(place: &TablePlace, name: &str) -> Option<Vec<String>> {
-    let plain = place.path.iter().all(|step| matches!(step, Step::Field(_)));
-    if plain && place.name() == name {
-        return Some(place.dotted().split('.').map(str::to_owned).collect());
-    }
-    let steps: Vec<&str> = name.split('.').collect();
-    let fits = steps.len() == place.path.len()
-        && steps.iter().zip(&place.path).all(|(step, expected)| match expected {
-            Step::Field(field) => step == field,
-            Step::Each => step.parse::<usize>().is_ok(),
-        });
-    fits.then(|| steps.into_iter().map(str::to_owned).collect())
 }
 
 #[cfg(test)]
@@ -205,10 +207,11 @@ mod tests {
 
     fn resolved(mut job: Value, parts: &[(&str, &str)]) -> (Value, Vec<&'static str>) {
         let registry = toy::registry();
-        let parts: Vec<TablePart> = parts
+        let parts: Vec<FilePart> = parts
             .iter()
-            .map(|(name, text)| TablePart { name: (*name).into(), text: text.to_string().into() })
+            .map(|(name, text)| FilePart { name: (*name).into(), bytes: text.to_string().into() })
             .collect();
+        let parts: Vec<&FilePart> = parts.iter().collect();
         let mut faults = Faults::default();
         resolve(
             &mut job,

@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use axum::body::Body;
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_LANGUAGE, CONTENT_LOCATION, CONTENT_TYPE, ETAG, HeaderName, HeaderValue, VARY,
+    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_LANGUAGE, CONTENT_LOCATION, CONTENT_TYPE, ETAG, HeaderName,
+    HeaderValue, VARY,
 };
 use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::response::Response;
 use bytes::Bytes;
-use precut_calc::calculator::{Figure, Meta, Value, Values};
+use precut_calc::calculator::{Dialect, Figure, Meta, ProgramEncoding, ProgramOrigin, Value, Values};
 use serde::Deserialize;
 use tokio::sync::Semaphore;
 
@@ -79,7 +80,8 @@ pub(super) fn offered(meta: &Meta) -> Vec<Media> {
     let mut offered = vec![Media::Json];
     offered.extend((!meta.tables.is_empty()).then_some(Media::Csv));
     offered.extend((!meta.figures.is_empty()).then_some(Media::Svg));
-    offered.extend(meta.has_program.then_some(Media::Gcode));
+    offered.extend(meta.program.map(|_| Media::Gcode));
+    offered.extend((meta.program == Some(ProgramOrigin::Brought)).then_some(Media::Diff));
     offered.extend([Media::Xlsx, Media::Pdf]);
     offered
 }
@@ -104,7 +106,7 @@ impl View {
         let part = match media {
             Media::Csv => parts.table,
             Media::Svg => parts.figure,
-            Media::Json | Media::Gcode | Media::Xlsx | Media::Pdf => None,
+            Media::Json | Media::Gcode | Media::Diff | Media::Xlsx | Media::Pdf => None,
         };
         let include = parts.include.filter(|_| media == Media::Json);
         Ok(Self { media, part, include, language: negotiate::language(headers) })
@@ -143,8 +145,8 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
         response
     } else {
         let (media, language) = (view.media, view.language);
-        let body = if media == Media::Json && view.include.is_none() && language == Language::default() {
-            stored.body.clone()
+        let made = if media == Media::Json && view.include.is_none() && language == Language::default() {
+            Rendered::of(media, stored.body.clone())
         } else {
             let stored = stored.clone();
             let place = if media.is_heavy() { PLACES.acquire().await.ok() } else { None };
@@ -155,9 +157,12 @@ pub(super) async fn respond(stored: Arc<Stored>, view: View, condition: &HeaderM
             });
             made.await.map_err(|_| Problem::internal())??
         };
-        let mut response = Response::new(Body::from(body));
+        let mut response = Response::new(Body::from(made.body));
         let headers = response.headers_mut();
-        headers.insert(CONTENT_TYPE, HeaderValue::from_static(media.content_type()));
+        headers.insert(CONTENT_TYPE, HeaderValue::from_static(made.content_type));
+        if let Some(file) = made.file {
+            headers.insert(CONTENT_DISPOSITION, value(format!("attachment; filename=\"{file}\"")));
+        }
         headers.insert(CONTENT_LANGUAGE, HeaderValue::from_static(language.tag()));
         response
     };
@@ -201,7 +206,7 @@ pub fn written(stored: &Stored, media: Media, part: Option<&str>, language: Lang
     if !offered.contains(&media) {
         return Err(not_acceptable(&offered));
     }
-    rendered(stored, &View { media, part: part.map(ToOwned::to_owned), include: None, language })
+    Ok(rendered(stored, &View { media, part: part.map(ToOwned::to_owned), include: None, language })?.body)
 }
 
 pub(super) fn not_acceptable(offered: &[Media]) -> Problem {
@@ -209,7 +214,48 @@ pub(super) fn not_acceptable(offered: &[Media]) -> Problem {
     Problem::new(StatusCode::NOT_ACCEPTABLE, "not_acceptable").with("available", available.join(", "))
 }
 
-fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
+/// An answer in some form.
+struct Rendered {
+    body: Bytes,
+    content_type: &'static str,
+    /// What it is called as a file, where that is said.
+    file: Option<&'static str>,
+}
+
+impl Rendered {
+    fn of(media: Media, body: Bytes) -> Self {
+        Self { body, content_type: media.content_type(), file: None }
+    }
+}
+
+fn rendered(stored: &Stored, view: &View) -> Result<Rendered, Problem> {
+    let is_returned = stored.entry().meta().program == Some(ProgramOrigin::Brought);
+    match view.media {
+        Media::Gcode | Media::Diff if is_returned => returned(stored, view.media),
+        media => Ok(Rendered::of(media, made(stored, view)?)),
+    }
+}
+
+/// The program that the job brought along, as it is given back, or what changed in it: in its own encoding.
+fn returned(stored: &Stored, media: Media) -> Result<Rendered, Problem> {
+    let program = stored.returned()?.ok_or_else(Problem::internal)?;
+    let is_diff = media == Media::Diff;
+    let body = program.encoding.encoded(if is_diff { &program.diff } else { &program.text });
+    let content_type = match (program.encoding, is_diff) {
+        (ProgramEncoding::Utf8, _) => media.content_type(),
+        (ProgramEncoding::Latin1, false) => "text/x-gcode; charset=iso-8859-1",
+        (ProgramEncoding::Latin1, true) => "text/x-diff; charset=iso-8859-1",
+    };
+    let file = match (program.dialect, is_diff) {
+        (_, true) => "program.diff",
+        (Dialect::Siemens, _) => "program.mpf",
+        (Dialect::LinuxCnc, _) => "program.ngc",
+        (Dialect::Fanuc | Dialect::FanucA | Dialect::FanucC, _) => "program.nc",
+    };
+    Ok(Rendered { body: body.ok_or_else(Problem::internal)?.into(), content_type, file: Some(file) })
+}
+
+fn made(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
     let wanted = |id: &str| view.part.as_deref().is_none_or(|part| part == id);
     let text = match view.media {
         Media::Json if view.include == Some(Include::Figures) => return with_figures(stored, view.language),
@@ -230,6 +276,7 @@ fn rendered(stored: &Stored, view: &View) -> Result<Bytes, Problem> {
             let program = stored.program()?.ok_or_else(Problem::internal)?;
             render::gcode(&program, &program_header(stored))
         }
+        Media::Diff => return Err(Problem::internal()),
         Media::Xlsx => return Ok(report::xlsx(stored, view.language)?.into()),
         Media::Pdf => return Ok(report::pdf(stored, view.language)?.into()),
     };

@@ -16,19 +16,19 @@ use super::Peer;
 use super::problem::Problem;
 use crate::config::{Limits, seconds};
 use crate::engine::budget::{Budget, Held, Spent, charge_of};
-use crate::engine::{Body, TablePart};
+use crate::engine::{Body, FilePart};
 
-/// Parts of a multipart body beside `job`; a job has fewer tables.
-const MOST_TABLES: usize = 16;
+/// Parts of a multipart body beside `job`; a job takes fewer files.
+const MOST_FILES: usize = 16;
 
-/// The job in the body of a request; whether its measured tables may come as files is asked where that matters.
+/// The job in the body of a request; whether anything of it may come as files is asked where that matters.
 pub(super) async fn job(
     request: Request,
-    takes_tables: impl Fn() -> bool,
+    takes_files: impl Fn() -> bool,
     limits: &Limits,
     budget: &Budget,
 ) -> Result<Body, Problem> {
-    let kind = Kind::of(request.headers(), &takes_tables)?;
+    let kind = Kind::of(request.headers(), &takes_files)?;
     let limit = match kind {
         Kind::Json => limits.json_bytes,
         Kind::Multipart => limits.multipart_bytes,
@@ -89,12 +89,12 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(headers: &HeaderMap, takes_tables: &impl Fn() -> bool) -> Result<Self, Problem> {
-        let refused = |received: &str| Err(Problem::media_type(received, takes_tables()));
+    fn of(headers: &HeaderMap, takes_files: &impl Fn() -> bool) -> Result<Self, Problem> {
+        let refused = |received: &str| Err(Problem::media_type(received, takes_files()));
         if let Some(encoding) = headers.get(CONTENT_ENCODING)
             && !encoding.as_bytes().eq_ignore_ascii_case(b"identity")
         {
-            return Err(Problem::encoded(encoding.to_str().unwrap_or("?"), takes_tables()));
+            return Err(Problem::encoded(encoding.to_str().unwrap_or("?"), takes_files()));
         }
         let Some(sent) = headers.get(CONTENT_TYPE) else { return refused("") };
         if sent == "application/json" {
@@ -103,7 +103,7 @@ impl Kind {
         let Ok(sent) = sent.to_str() else { return refused("?") };
         let mut parameters = sent.split(';').map(str::trim);
         let essence = parameters.next().unwrap_or_default();
-        if essence.eq_ignore_ascii_case("multipart/form-data") && takes_tables() {
+        if essence.eq_ignore_ascii_case("multipart/form-data") && takes_files() {
             return Ok(Self::Multipart);
         }
         let other_charset = parameters.filter_map(|parameter| parameter.split_once('=')).any(|(name, value)| {
@@ -159,7 +159,7 @@ async fn parts(mut request: Request, limit: usize, budget: &Budget) -> Result<Bo
         if is_over_limit { Problem::too_large(limit) } else { Problem::multipart(error.body_text()) }
     };
     let mut job = None;
-    let mut tables: Vec<TablePart> = Vec::new();
+    let mut files: Vec<FilePart> = Vec::new();
     while let Some(mut field) = multipart.next_field().await.map_err(|error| fault(&error))? {
         let Some(name) = field.name().map(ToOwned::to_owned) else {
             return Err(Problem::multipart("a part has no name".to_owned()));
@@ -174,16 +174,16 @@ async fn parts(mut request: Request, limit: usize, budget: &Budget) -> Result<Bo
             if job.replace(bytes).is_some() {
                 return Err(Problem::multipart("there are two parts `job`".to_owned()));
             }
-        } else if tables.iter().any(|table| table.name == name) {
+        } else if files.iter().any(|file| file.name == name) {
             return Err(Problem::multipart(format!("there are two parts `{name}`")));
-        } else if tables.len() == MOST_TABLES {
-            return Err(Problem::multipart(format!("there are more than {MOST_TABLES} tables")));
+        } else if files.len() == MOST_FILES {
+            return Err(Problem::multipart(format!("there are more than {MOST_FILES} files")));
         } else {
-            tables.push(TablePart { name, text: bytes });
+            files.push(FilePart { name, bytes });
         }
     }
     let job = job.ok_or_else(|| Problem::new(StatusCode::BAD_REQUEST, "missing_job_part"))?;
-    Ok(Body::Parts { job, tables })
+    Ok(Body::Parts { job, files })
 }
 
 /// Reads and forgets what a client still sends after it was refused, so that closing the connection does not reset

@@ -104,7 +104,7 @@ async fn answered(
     for tag in headers.get_all(IF_NONE_MATCH) {
         condition.append(IF_NONE_MATCH, tag.clone());
     }
-    let job = body::job(request, || room.entry.takes_tables(), &app.limits, app.engine.bodies()).await?;
+    let job = body::job(request, || room.entry.takes_files(), &app.limits, app.engine.bodies()).await?;
     let solved = match app.engine.submit(room.id(), job, ask).await? {
         Answered::Solved(solved) => solved,
         Answered::Job(job) => return Ok(jobs::accepted(&job, preference, language)),

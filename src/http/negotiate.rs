@@ -18,6 +18,8 @@ pub enum Media {
     Svg,
     /// Its program for the machine.
     Gcode,
+    /// What changed in the program that its job brought along.
+    Diff,
     /// Its inputs and all of its tables as a workbook.
     Xlsx,
     /// All of it as a report on paper.
@@ -32,16 +34,18 @@ impl Media {
             Self::Csv => "text/csv",
             Self::Svg => "image/svg+xml",
             Self::Gcode => "text/x-gcode",
+            Self::Diff => "text/x-diff",
             Self::Xlsx => "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
             Self::Pdf => "application/pdf",
         }
     }
 
-    /// As in `Content-Type`.
+    /// As in `Content-Type`, where an answer has nothing of its own to say.
     pub const fn content_type(self) -> &'static str {
         match self {
             Self::Csv => "text/csv; charset=utf-8; header=present",
             Self::Gcode => "text/x-gcode; charset=utf-8",
+            Self::Diff => "text/x-diff; charset=utf-8",
             Self::Json | Self::Svg | Self::Xlsx | Self::Pdf => self.essence(),
         }
     }
@@ -58,6 +62,7 @@ impl Media {
             Self::Csv => "csv",
             Self::Svg => "svg",
             Self::Gcode => "gcode",
+            Self::Diff => "diff",
             Self::Xlsx => "xlsx",
             Self::Pdf => "pdf",
         }

@@ -148,8 +148,8 @@ impl Problem {
     }
 
     /// A body of a type that is not read; the type is empty where none was said.
-    pub(super) fn media_type(received: &str, takes_tables: bool) -> Self {
-        let expected = if takes_tables { "application/json or multipart/form-data" } else { "application/json" };
+    pub(super) fn media_type(received: &str, takes_files: bool) -> Self {
+        let expected = if takes_files { "application/json or multipart/form-data" } else { "application/json" };
         Self::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "unsupported_media_type")
             .with("received", received.to_owned())
             .with("expected", expected)
@@ -163,8 +163,8 @@ impl Problem {
     }
 
     /// A body that is compressed.
-    pub(super) fn encoded(encoding: &str, takes_tables: bool) -> Self {
-        Self::media_type("", takes_tables).with("encoding", encoding.to_owned())
+    pub(super) fn encoded(encoding: &str, takes_files: bool) -> Self {
+        Self::media_type("", takes_files).with("encoding", encoding.to_owned())
     }
 
     pub(super) fn multipart(reason: String) -> Self {

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
     Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Place,
-    Program, Table, Violations, Watched,
+    Program, ReturnedProgram, Table, Violations, Watched,
 };
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
@@ -19,7 +19,7 @@ use utoipa::openapi::{RefOr, Schema};
 use super::canonical::canonical;
 use super::checker::{Checker, Faults};
 use super::contract::{self, Contract, Make};
-use super::place::{TablePlace, table_places};
+use super::place::{Places, TablePlace, TextPlace, places};
 use super::schema::Components;
 use super::shape::Shape;
 use super::watched::Observed;
@@ -30,9 +30,9 @@ use super::{family, names};
 pub struct Entry {
     meta: Meta,
     contracts: Contracts,
-    /// What jobs are held against, and where their tables stand: made for the first job.
+    /// What jobs are held against, and where stands what may come as files: made for the first job.
     checker: OnceLock<Checker>,
-    tables: OnceLock<Vec<TablePlace>>,
+    files: OnceLock<Places>,
     /// What a job may be made of, for who reads it.
     shape: OnceLock<Shape>,
     /// Schemas of job and result with references followed and unions told apart: made for the first who asks.
@@ -188,7 +188,7 @@ impl Entry {
             meta: *meta,
             contracts,
             checker: OnceLock::new(),
-            tables: OnceLock::new(),
+            files: OnceLock::new(),
             shape: OnceLock::new(),
             strict_input: OnceLock::new(),
             strict_output: OnceLock::new(),
@@ -258,12 +258,12 @@ impl Entry {
         follows(self.made_output())
     }
 
-    /// What jobs are held against; where the tables stand is read off the same schema.
+    /// What jobs are held against; where stands what may come as files is read off the same schema.
     fn checker(&self) -> &Checker {
         let made = || match self.members() {
             [] => {
                 let strict = follows(self.input().strict());
-                self.tables.get_or_init(|| table_places(&strict));
+                self.files.get_or_init(|| places(&strict));
                 Checker::new(strict)
             }
             members => of_members(members),
@@ -283,7 +283,7 @@ impl Entry {
             contract.components()?;
         }
         let strict = input.strict()?;
-        let _ = self.tables.set(table_places(&strict));
+        let _ = self.files.set(places(&strict));
         let checker = match self.members() {
             [] => Checker::new(strict),
             members => of_members(members),
@@ -330,14 +330,22 @@ impl Entry {
     }
     /// Whether the job takes measured tables (CSV in place, or file parts).
     pub fn takes_tables(&self) -> bool {
-        !self.tables().is_empty()
+        !self.files().tables.is_empty()
     }
-    /// Names of the file parts that the job takes, with dots from the root.
+    /// Whether anything of the job may come as a file part.
+    pub fn takes_files(&self) -> bool {
+        self.takes_tables() || !self.files().texts.is_empty()
+    }
+    /// Names of its measured tables, with dots from the root.
     pub fn table_names(&self) -> Vec<String> {
-        self.tables().iter().map(TablePlace::dotted).collect()
+        self.files().tables.iter().map(|place| place.way.dotted()).collect()
     }
-    fn tables(&self) -> &[TablePlace] {
-        self.tables.get_or_init(|| table_places(&follows(self.input().strict())))
+    /// Names of its long texts that may come as file parts, in the same way.
+    pub fn text_names(&self) -> Vec<String> {
+        self.files().texts.iter().map(|place| place.way.dotted()).collect()
+    }
+    fn files(&self) -> &Places {
+        self.files.get_or_init(|| places(&follows(self.input().strict())))
     }
     /// Every code that it may utter: those of its declaration and those of its fields.
     pub fn codes(&self) -> BTreeSet<String> {
@@ -374,7 +382,13 @@ impl Entry {
         let Some(entry) = self.of_job(job) else { return &[] };
         // Who asks for the tables of a job checks it next.
         entry.checker();
-        entry.tables()
+        &entry.files().tables
+    }
+    /// Where its long texts stand that may come as files.
+    pub(crate) fn texts_of(&self, job: &Value) -> &[TextPlace] {
+        let Some(entry) = self.of_job(job) else { return &[] };
+        entry.checker();
+        &entry.files().texts
     }
     /// What a job may be made of; `of_any` says it of the job of any calculator, where there is one inside.
     pub(crate) fn shape(&self, of_any: impl FnOnce() -> Shape) -> &Shape {
@@ -478,6 +492,15 @@ impl Entry {
     pub(crate) fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
         self.of_kept_job(input)?.calculation.program(input, envelope)
     }
+    /// The program that its job brought along, as it is given back.
+    pub(crate) fn returned(
+        &self,
+        input: &[u8],
+        envelope: &[u8],
+        made_by: &str,
+    ) -> Result<MaybeReturned, UnreadableResult> {
+        self.of_kept_job(input)?.calculation.returned(input, envelope, made_by)
+    }
 }
 
 impl std::fmt::Debug for Entry {
@@ -568,6 +591,7 @@ pub struct ResultNotes {
 pub struct UnreadableResult(pub String);
 
 type MaybeProgram = Option<Result<Program, Failure>>;
+type MaybeReturned = Option<Result<ReturnedProgram, Failure>>;
 
 /// A job, and what becomes of it at another place of a picture.
 pub(crate) struct Moved {
@@ -586,6 +610,10 @@ pub(crate) trait Calculation: Send + Sync {
     fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
     fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
+    /// What is made of other calculators' jobs brings no program along.
+    fn returned(&self, _input: &[u8], _envelope: &[u8], _made_by: &str) -> Result<MaybeReturned, UnreadableResult> {
+        Ok(None)
+    }
     /// What has no places of its own stands where it is.
     fn at_place(&self, _input: &[u8], _envelope: &[u8], _place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
         Ok(None)
@@ -691,6 +719,10 @@ impl<C: Calculator> Calculation for Typed<C> {
     fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
         let (input, output) = read::<C>(input, envelope)?;
         Ok(C::program(&input, &output))
+    }
+    fn returned(&self, input: &[u8], envelope: &[u8], made_by: &str) -> Result<MaybeReturned, UnreadableResult> {
+        let (input, output) = read::<C>(input, envelope)?;
+        Ok(C::returned(&input, &output, made_by))
     }
     fn at_place(&self, input: &[u8], envelope: &[u8], place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
         let (input, output) = read::<C>(input, envelope)?;

@@ -9,8 +9,8 @@ use super::checker::ItemRules;
 /// A field of a job that holds a measured table.
 #[derive(Debug, Clone)]
 pub(crate) struct TablePlace {
-    /// Way from the root of the job.
-    pub(crate) path: Vec<Step>,
+    /// JobWay from the root of the job.
+    pub(crate) way: JobWay,
     /// What a row holds.
     pub(crate) columns: Vec<TableColumn>,
     /// Most rows.
@@ -65,11 +65,24 @@ pub(crate) enum CellKind {
     Truth,
 }
 
-impl TablePlace {
+/// A field of a job that holds a long text, which may come as a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct TextPlace {
+    /// JobWay from the root of the job.
+    pub(crate) way: JobWay,
+    /// JobWay from beside it to the field that says which bytes its characters are.
+    pub(crate) encoding: Vec<String>,
+}
+
+/// A way into a job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct JobWay(pub(crate) Vec<Step>);
+
+impl JobWay {
     /// Names of the fields on the way, with dots; the name of a file part may be this or its last piece.
     pub(crate) fn dotted(&self) -> String {
         let names: Vec<&str> = self
-            .path
+            .0
             .iter()
             .map(|step| match step {
                 Step::Field(name) => name.as_str(),
@@ -80,26 +93,55 @@ impl TablePlace {
     }
 
     /// Last name on the way.
-    pub(crate) fn name(&self) -> &str {
-        match self.path.last() {
+    fn name(&self) -> &str {
+        match self.0.last() {
             Some(Step::Field(name)) => name,
             _ => "",
         }
     }
+
+    /// The way to the place that the name of a file part means: the last name, or all names and indices with dots.
+    pub(crate) fn fit(&self, name: &str) -> Option<Vec<String>> {
+        let plain = self.0.iter().all(|step| matches!(step, Step::Field(_)));
+        if plain && self.name() == name {
+            return Some(self.dotted().split('.').map(str::to_owned).collect());
+        }
+        let steps: Vec<&str> = name.split('.').collect();
+        let fits = steps.len() == self.0.len()
+            && steps.iter().zip(&self.0).all(|(step, expected)| match expected {
+                Step::Field(field) => step == field,
+                Step::Each => step.parse::<usize>().is_ok(),
+            });
+        fits.then(|| steps.into_iter().map(str::to_owned).collect())
+    }
 }
 
-/// Every measured table that a job of this (strict) schema may hold.
-pub(super) fn table_places(strict: &Value) -> Vec<TablePlace> {
-    let mut places = Vec::new();
+/// What of a job may come as files.
+#[derive(Debug, Default)]
+pub(super) struct Places {
+    pub(super) tables: Vec<TablePlace>,
+    pub(super) texts: Vec<TextPlace>,
+}
+
+/// Everything in a job of this (strict) schema that may come as a file.
+pub(super) fn places(strict: &Value) -> Places {
+    let mut places = Places::default();
     walk(strict, &mut Vec::new(), &mut places);
     places
 }
 
-fn walk(schema: &Value, path: &mut Vec<Step>, places: &mut Vec<TablePlace>) {
+fn walk(schema: &Value, path: &mut Vec<Step>, places: &mut Places) {
     let Some(map) = schema.as_object() else { return };
     if map.contains_key("x-table") {
-        if !places.iter().any(|place| place.path == *path) {
-            places.push(place(schema, path));
+        if !places.tables.iter().any(|place| place.way.0 == *path) {
+            places.tables.push(place(schema, path));
+        }
+        return;
+    }
+    if let Some(encoding) = map.get("x-text-file").and_then(Value::as_str) {
+        if !places.texts.iter().any(|place| place.way.0 == *path) {
+            let encoding = encoding.split('/').map(str::to_owned).collect();
+            places.texts.push(TextPlace { way: JobWay(path.clone()), encoding });
         }
         return;
     }
@@ -136,7 +178,7 @@ fn place(schema: &Value, path: &[Step]) -> TablePlace {
         .collect();
     let max_rows = schema["maxItems"].as_u64().and_then(|most| usize::try_from(most).ok()).unwrap_or(usize::MAX);
     let free = FreeColumns { numbers: free("numbers"), words: free("words") };
-    TablePlace { path: path.to_vec(), columns, max_rows, free, rules: Arc::new(ItemRules::of(schema)) }
+    TablePlace { way: JobWay(path.to_vec()), columns, max_rows, free, rules: Arc::new(ItemRules::of(schema)) }
 }
 
 fn kind(declared: &Value) -> CellKind {

@@ -225,7 +225,7 @@ impl Calculator for Toy {
         },
         figures: &["bending"],
         tables: &["bending"],
-        has_program: false,
+        program: None,
     };
 
     fn fill(_input: &mut ToyInput) {}

@@ -18,6 +18,7 @@ mod keys;
 mod matrix;
 mod offers;
 mod processes;
+mod programs;
 mod records;
 mod rooms;
 mod screenshots;

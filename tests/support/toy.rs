@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use precut::registry::Registry;
 use precut_calc::calculator::{
     Answer, Axis, Basis, Block, Calculator, CalculatorKind, Check, Codes, Column, Cost, Dialect, Example, Failure,
-    Figure, Finding, Frame, Hallmark, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program, Registrar,
-    Role, Table, Violations, checkpoint,
+    Figure, Finding, Frame, Hallmark, Item, Measured, MeasuredRow, Message, Meta, Monitor, Panel, Program,
+    ProgramOrigin, Registrar, Role, Table, Violations, checkpoint,
 };
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -227,7 +227,7 @@ impl Calculator for Bar {
         },
         figures: &["sag", "load"],
         tables: &["stations", "summary"],
-        has_program: true,
+        program: Some(ProgramOrigin::Made),
     };
 
     fn fill(_input: &mut BarJob) {}

@@ -162,7 +162,9 @@ export async function file(key, accept, query = '') {
   return (await ask(`/v1/results/${key}${query}`, { headers: { Accept: accept } })).blob();
 }
 export async function program(key, signal) {
-  return (await ask(`/v1/results/${key}`, { signal, headers: { Accept: 'text/x-gcode' } })).text();
+  const response = await ask(`/v1/results/${key}`, { signal, headers: { Accept: 'text/x-gcode' } });
+  const charset = /charset=([\w-]+)/.exec(response.headers.get('Content-Type'))?.[1] ?? 'utf-8';
+  return new TextDecoder(charset).decode(await response.arrayBuffer());
 }
 
 const recordAt = (list, name) => `/v1/${list}/${enc(name)}`;

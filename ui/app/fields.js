@@ -86,6 +86,7 @@ export function Row({ name, schema, path, value, required, context, control: Con
   const unit = unitOf(schema);
   const common = {
     id,
+    path,
     schema,
     value,
     context,
@@ -243,11 +244,6 @@ function useDrag(value, schema, set) {
 
 export function TextInput({ id, value, schema, set, described, invalid, label, required, context }) {
   const take = event => set(event.currentTarget.value === '' && !required ? undefined : event.currentTarget.value, 'typing');
-  if (schema['x-lines'])
-    return html`
-    <label for=${id} class="label">${label}</label>
-    <textarea id=${id} rows="12" class="json" wrap="off" spellcheck=${false} autocomplete="off" value=${value ?? ''} disabled=${context.disabled}
-      aria-describedby=${described} aria-invalid=${invalid ? 'true' : undefined} aria-required=${required ? 'true' : undefined} onInput=${take}></textarea>`;
   return html`
     <label for=${id} class="label">${label}</label>
     <span class="control wide">${context.names?.has(value) && html`<span class="called">${context.names.get(value)}</span>`}<input id=${id} type="text" autocomplete="off" value=${value ?? ''} placeholder=${schema.default ?? ''} disabled=${context.disabled}

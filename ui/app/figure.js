@@ -3,7 +3,7 @@
 import { html, useState, useRef, useMemo, useLayoutEffect, useEffect, usePrinting, unique } from './lib.js';
 import { t, number, unitSymbol } from './text.js';
 import { scale, extent, aired, ticks, labels, valueAt, cellAt } from './scale.js';
-import { items, styles, weaves, hasRibbons, stretchAt, barStep } from './draw.js';
+import { items, styles, weaves, hasRibbons, stretchAt, barStep, linePath } from './draw.js';
 import { axisName, readDigits, abscissae, ordinates, Head, describe } from './panel.js';
 import { Polar } from './polar.js';
 import { Handles, usePlane } from './handles.js';
@@ -129,8 +129,8 @@ const evenly = (ends, isLog) =>
 
 /** The picture. `onPut(setting, x, y, how)` puts a setting of it elsewhere, `trial` is where one is tried along a curve,
  *  `{ x, move(x) }`; `onHold(handle)` where its handles can be pulled, giving `{ move(place), drop() }`; `effect` says what
- *  that did, `{ name, texts }`; `onPick(x, y)` reads a place. */
-export function Picture({ figure, pinned, height: screenHeight = 460, onPut, trial, onHold, effect, onPick: onRead, main }) {
+ *  that did, `{ name, texts }`; `onPick(x, y, panel)` reads a place; `marks` are curves to be lit, by panels. */
+export function Picture({ figure, pinned, height: screenHeight = 460, onPut, trial, onHold, effect, onPick: onRead, marks, main }) {
   const plane = usePlane(figure, onPut, trial);
   const onPick = plane.onPick ?? onRead;
   const { handle } = plane;
@@ -234,7 +234,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
           ArrowUp: () => rise(1, event.shiftKey),
           ArrowDown: () => rise(-1, event.shiftKey),
           Enter: () => {
-            if (onPick && at !== null && over !== null) onPick(at, over);
+            if (onPick && at !== null && over !== null) onPick(at, over, 0);
           },
         }
       : {};
@@ -282,7 +282,7 @@ export function Picture({ figure, pinned, height: screenHeight = 460, onPut, tri
           width > 0 &&
           (isPolar
             ? html`<${Polar} ...${common} ...${{ least, setAt, onPut }} />`
-            : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold }} />`)
+            : html`<${Stacked} ...${common} ...${{ full, setAt, setOver, setView, drag, setDrag, onPick, handle, onHold, marks }} />`)
         }
       </div>
       <p class="hidden" role="status">${spoken}</p>
@@ -355,6 +355,7 @@ function Stacked({
   handle,
   onHold,
   effect,
+  marks,
 }) {
   const shares = figure.panels.reduce((sum, panel) => sum + panel.height, 0) || 1;
   const ghosts = figure.panels.map((_, index) => pinned?.panels[index] || null);
@@ -391,9 +392,12 @@ function Stacked({
     return { place, value: x.back(place) };
   };
   /** The ordinate under the pointer, in the panel that it is over. */
-  const spot = event => {
+  const under = event => {
     const svgs = [...event.currentTarget.querySelectorAll('svg[data-panel]')];
-    const svg = svgs.findLast(one => event.clientY >= one.getBoundingClientRect().top) || svgs[0];
+    return svgs.findLast(one => event.clientY >= one.getBoundingClientRect().top) || svgs[0];
+  };
+  const spot = event => {
+    const svg = under(event);
     const { domain, panel, tall } = panels[Number(svg.dataset.panel)];
     const v = Math.min(Math.max(event.clientY - svg.getBoundingClientRect().top, 6), 6 + tall);
     return scale(panel.y.scale, domain, [6 + tall, 6]).back(v);
@@ -456,7 +460,7 @@ function Stacked({
       return;
     }
     if (!onPick) return;
-    onPick(where(event).value, spot(event));
+    onPick(where(event).value, spot(event), Number(under(event).dataset.panel));
   };
   const wheel = event => {
     if (!event.ctrlKey && !event.metaKey) return;
@@ -500,6 +504,7 @@ function Stacked({
             <g clip-path=${`url(#${clip})`}>
               ${ghost && items(ghost, plane, { style, hidden, ghost: true })}
               ${items(panel, plane, { style, hidden })}
+              ${marks?.[index]?.map((mark, place) => html`<path key=${place} class="marked" d=${linePath(mark.x, mark.y, plane.place, frame.width)} />`)}
             </g>
             <rect class="frame" x=${left} y="6" width=${Math.max(1, right - left)} height=${tall} />
             <g class="tick-labels" text-anchor="end">${places.map((place, tick) => html`<text x=${left - 6} y=${y(place) + 4}>${texts[tick]}</text>`)}</g>

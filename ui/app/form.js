@@ -36,6 +36,7 @@ import {
 } from './fields.js';
 import { List, MapFields } from './lists.js';
 import { TableInput } from './table-input.js';
+import { TextFile } from './text-file.js';
 import { forget, isSame, keep, ownName, useKept } from './mine.js';
 import { Records } from './records.js';
 import { withFollowers } from './follow.js';
@@ -337,6 +338,7 @@ export function Field(props) {
   if (name === 'model' && kind === 'string' && context.models.length + (value ? 1 : 0) > 0)
     return html`<${Row} ...${props} control=${ModelChoice} />`;
   if (kind === 'number') return html`<${Row} ...${props} control=${NumberInput} />`;
+  if (schema['x-text-file']) return html`<${Row} ...${props} control=${TextFile} />`;
   if (kind === 'string') return html`<${Row} ...${props} control=${TextInput} />`;
   if (kind === 'enum') return html`<${Row} ...${props} control=${Enum} />`;
   if (kind === 'boolean') return html`<${Row} ...${props} control=${Switch} />`;

@@ -3,6 +3,8 @@
 import { html, render, useState } from './lib.js';
 import { t } from './text.js';
 import * as api from './api.js';
+import { declaredProgram, programText } from './program.js';
+import { originOf } from './text-file.js';
 
 export function save(blob, name) {
   const link = document.createElement('a');
@@ -14,18 +16,18 @@ export function save(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-/** `take(accept, ending, query)` fetches the answer in a form and saves it; `owns(key)` says whether it is still that of
+/** `take(accept, ending, query, whole)` fetches the answer in a form and saves it, under a name of its own where it has one; `owns(key)` says whether it is still that of
  *  the inputs on the screen. Also what went wrong. */
 export function useHandOver({ name, answer, owns }) {
   // What went wrong with another answer is no trouble of this one.
   const [failed, setFailed] = useState({ key: null, why: null });
-  const take = async (accept, ending, query = '') => {
+  const take = async (accept, ending, query = '', whole = `${name}.${ending}`) => {
     const { key } = answer;
     setFailed({ key, why: null });
     if (!owns(key)) return;
     try {
       const blob = await api.file(key, accept, query);
-      if (owns(key)) save(blob, `${name}.${ending}`);
+      if (owns(key)) save(blob, whole);
       else setFailed({ key, why: t('changed_meanwhile') });
     } catch (error) {
       setFailed({ key, why: error.problem?.detail || error.message });
@@ -62,6 +64,12 @@ export function printAlone(page, owns, key) {
 /** A file of an answer is told from others by the beginning of its key. */
 export const fileName = (id, answer) => `${id}-${answer.key.slice(3, 11)}`;
 
+/** What the file was called whose text the job brought along, if it came as one: what is given back is called so, too. */
+export function givenName(description, answer) {
+  const said = declaredProgram(description);
+  return said ? originOf(programText(said, answer.job)) : undefined;
+}
+
 /** The media type of a workbook. */
 export const WORKBOOK = 'application/vnd.openxmlformats-officedocument.spreadsheetml.sheet';
 
@@ -69,6 +77,7 @@ export const WORKBOOK = 'application/vnd.openxmlformats-officedocument.spreadshe
 export function Downloads({ id, description, answer, figure, stale, owns }) {
   const [take, trouble] = useHandOver({ name: fileName(id, answer), answer, owns });
   const has = type => description.media_types.includes(type);
+  const given = givenName(description, answer);
   const button = (text, ...what) => html`<button type="button" disabled=${stale} onClick=${() => take(...what)}>${text}</button>`;
   return html`
     <span class="downloads" role="group" aria-label=${t('download')}><span class="quiet">${t('download')}</span>
@@ -77,7 +86,8 @@ export function Downloads({ id, description, answer, figure, stale, owns }) {
       ${has(WORKBOOK) && button('XLSX', WORKBOOK, 'xlsx')}
       ${has('application/pdf') && button('PDF', 'application/pdf', 'pdf')}
       ${has('image/svg+xml') && figure && button('SVG', 'image/svg+xml', 'svg', `?figure=${figure.id}`)}
-      ${has('text/x-gcode') && button(t('gcode'), 'text/x-gcode', 'nc')}
+      ${has('text/x-gcode') && button(t('gcode'), 'text/x-gcode', 'nc', '', given)}
+      ${has('text/x-diff') && button(t('diff'), 'text/x-diff', 'diff', '', given && `${given}.diff`)}
       <button type="button" disabled=${stale} onClick=${() => {
         if (owns(answer.key)) window.print();
       }}>${t('print')}</button>

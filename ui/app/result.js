@@ -8,6 +8,7 @@ import { replayOf, Replay } from './replay.js';
 import { triedIn, held, Trial } from './trial.js';
 import { placeOf, settingsOf } from './elsewhere.js';
 import { Bars } from './bars.js';
+import { Program, lineAt, useProgram } from './program.js';
 import { causesOf, causesHeadline, saidOfCauses, nextAdvised, Causes } from './cause.js';
 import { hasOffers, Offers } from './offers.js';
 import { sheetOf, takeSheet } from './inspection.js';
@@ -135,7 +136,7 @@ function NoAnswer({ running, problem, trouble }) {
 }
 
 /** The main picture, with what it can be asked: its run state by state, a setting tried along it. */
-function MainPicture({ id, desk, description, answer, pinned, interim, figure, figures, difference, told, apply }) {
+function MainPicture({ id, desk, description, answer, pinned, interim, figure, figures, difference, told, apply, program }) {
   // An earlier state of the same run, in place of its end.
   const [earlier, setEarlier] = useState(null);
   // Where along a curve another setting is tried.
@@ -153,14 +154,16 @@ function MainPicture({ id, desk, description, answer, pinned, interim, figure, f
   const replay = isOwn ? replayOf(description, figure, body.result) : null;
   const trial = isOwn ? triedIn(figure) : undefined;
   const isHeld = isOwn && !earlier;
+  const pick = isOwn && program?.moves.length > 0 ? (x, y, panel) => program.choose(lineAt(program.moves[panel], { x, y })) : undefined;
   return html`
     <${Picture} key=${figure.id} figure=${subtracted?.panels.length ? subtracted : (replay && earlier) || figure} pinned=${subtracted ? null : twin} height=${trial ? Math.min(height, TRIAL_HEIGHT) : height} main
-      onPut=${isHeld ? put : null} trial=${trial && { x: tried ?? trial.x, move: x => setTried(held(figure, x)) }} onHold=${isHeld ? hold : null} effect=${effect} />
+      onPut=${isHeld ? put : null} trial=${trial && { x: tried ?? trial.x, move: x => setTried(held(figure, x)) }} onHold=${isHeld ? hold : null} effect=${effect} onPick=${pick} marks=${isOwn ? program?.marks : null} />
     ${twin && html`<p class="pin-legend">${subtracted ? t('pinned_less') : t('pinned_shadow')}</p>`}
     <div class="under">${interim && html`<p class="so-far" role="status">${t('so_far')}</p>`}</div>
     ${replay && html`<${Replay} key=${answer.key} id=${id} said=${replay} answer=${body} job=${answer.job} figure=${figure} figures=${figures} onShow=${setEarlier} />`}
     ${trial && html`<${Trial} key=${answer.key} ...${{ id, desk, figure, setting: trial, figures, answer, apply }} x=${tried ?? trial.x} setX=${setTried} />`}
-    ${isOwn && !trial && html`<${PlaneHint} figure=${figure} />`}`;
+    ${isOwn && !trial && html`<${PlaneHint} figure=${figure} />`}
+    ${pick && html`<p class="quiet hint">${t('press_a_cut')}</p>`}`;
 }
 
 /** The same picture of the pinned run, where it is another run. */
@@ -215,7 +218,11 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
   // The sheet for print is of the answer alone: it is not made anew with every letter.
   const paper = useMemo(() => body && html`<${Sheet} description=${description} body=${body} job=${answer.job} />`, [answer, description]);
   const model = models && causes?.named.length > 0;
-  if (!answer && !interim) return html`<${NoAnswer} ...${{ running, problem, trouble }} />`;
+  const program = useProgram({ description, answer, figure: interim ? null : figure, job: desk.state.job, problem });
+  const names = namesOf(description.input_schema);
+  const listing = program && html`<${Program} ...${{ program, description, answer, names }} />`;
+  if (!answer && !interim)
+    return html`<${NoAnswer} ...${{ running, problem, trouble }} />${program?.faults.length > 0 && html`<div class="with-program">${listing}</div>`}`;
   const [first, ...more] = body?.explanation.filter(({ code }) => !(causes && !causes.isSilent && saidOfCauses(code))) || [];
   // The answer is its first sentence; what else was said with it stands among the words.
   const [said, ...rest] = sentences(first?.text ?? '');
@@ -226,14 +233,17 @@ export function Result({ id, desk, description, answer, problem, trouble, runnin
     <div class=${`result ${stale ? 'stale' : ''}`}>
       ${!interim && html`<${FigureChoice} ...${{ figures, figure, choose: setChosen }} />`}
       <div class="picture-and-words">
-        <div class="picture-box">
-          ${figure ? html`<${MainPicture} ...${{ id, desk, description, answer, pinned, interim, figure, figures, difference, told, apply }} />` : html`<p class="quiet">${t('no_figure')}</p>`}
+        <div class=${`picture-box ${listing ? 'with-program' : ''}`}>
+          ${listing}
+          <div class="picture-of-it">
+          ${figure ? html`<${MainPicture} ...${{ id, desk, description, answer, pinned, interim, figure, figures, difference, told, apply, program }} />` : html`<p class="quiet">${t('no_figure')}</p>`}
+          </div>
         </div>
         ${
           body &&
           html`
         <div class="words">
-          <${Warnings} key=${answer.key} list=${body.warnings} names=${namesOf(description.input_schema)} />
+          <${Warnings} key=${answer.key} list=${body.warnings} names=${names} />
           ${hasOffers(description, body.result) && html`<${Offers} ...${{ description, answer, isCurrent: !stale, apply }} />`}
           <${Bars} result=${body.result} input=${body.input} description=${description} />
           ${causes && html`<${Causes} ...${{ causes, sheet, answer, owns, stale }} title=${description.title} name=${fileName(id, answer)} />`}

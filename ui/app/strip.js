@@ -4,7 +4,8 @@ import { html } from './lib.js';
 import { t, capital, number } from './text.js';
 import { spreadOf, withSpread } from './digits.js';
 import { flat } from './values.js';
-import { useHandOver, fileName } from './handover.js';
+import { useHandOver, fileName, givenName } from './handover.js';
+import { isGivenBack } from './program.js';
 
 /** Numbers beside the sentence. */
 const MOST_NUMBERS = 3;
@@ -65,10 +66,10 @@ const WHY = {
  *  @param {{ id: string, description: any, answer: any, said: string, limits?: string, numbers: Headline[], main?: any, standing: string, owns: any, trouble: any }} props */
 export function Strip({ id, description, answer, said, limits, numbers, main, standing, owns, trouble }) {
   const [take, refusal] = useHandOver({ name: fileName(id, answer), answer, owns });
-  const isProgram = description.media_types.includes('text/x-gcode');
+  const isProgram = description.media_types.includes('text/x-gcode') && isGivenBack(description, answer.answer.result);
   const hand = () => {
     if (main) main.act();
-    else if (isProgram) take('text/x-gcode', 'nc');
+    else if (isProgram) take('text/x-gcode', 'nc', '', givenName(description, answer));
     else if (owns(answer.key)) window.print();
   };
   const why = WHY[standing];

@@ -7,6 +7,7 @@ import { spreadColumns, withSpread } from './digits.js';
 import { answerSchema } from './cause.js';
 import { Values, wordUnder } from './values.js';
 import { useHandOver } from './handover.js';
+import { isGivenBack } from './program.js';
 
 /** Rows of a table shown at once. */
 const TABLE_ROWS = 200;
@@ -15,7 +16,7 @@ export function Tabs({ id, description, answer, pinned, stale, owns }) {
   const names = [
     'values',
     ...(description.tables.length ? ['tables'] : []),
-    ...(description.media_types.includes('text/x-gcode') ? ['program'] : []),
+    ...(description.media_types.includes('text/x-gcode') && isGivenBack(description, answer.answer.result) ? ['program'] : []),
     'basis',
     'request',
   ];

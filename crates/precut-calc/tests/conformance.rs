@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
     Along, Calculator, Cells, Check, Failure, Figure, ForwardModel, Frame, Handle, Item, Message, Monitor, Move,
-    Registrar, Unwatched, Violations,
+    ProgramOrigin, Registrar, Unwatched, Violations,
 };
 use serde_json::Value;
 
@@ -130,7 +130,8 @@ fn example_runs_and_repeats<C: Calculator>(job: &C::Input, example: &str) -> Vec
             .collect();
         assert!(lengths.len() <= 1, "{at}: table {} is ragged", table.id);
     }
-    assert_eq!(C::program(job, &first.output).is_some(), C::META.has_program, "{at}");
+    assert_eq!(C::program(job, &first.output).is_some(), C::META.program == Some(ProgramOrigin::Made), "{at}");
+    assert_eq!(C::returned(job, &first.output, "").is_some(), C::META.program == Some(ProgramOrigin::Brought), "{at}");
     has
 }
 

@@ -94,6 +94,7 @@ mod process_streams;
 mod process_support;
 mod process_watch;
 mod program_correction;
+mod program_fuzz;
 mod program_reading;
 mod program_stock;
 mod program_yielding;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::draw::Draw;
 
-fn cases(name: &str) -> Vec<Value> {
+pub(crate) fn cases(name: &str) -> Vec<Value> {
     let package = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = package.join("reference/program-compensation").join(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -17,11 +17,11 @@ fn cases(name: &str) -> Vec<Value> {
     file["cases"].as_array().unwrap().clone()
 }
 
-fn job(program: &str, dialect: &str, reading: &Value) -> Value {
+pub(crate) fn job(program: &str, dialect: &str, reading: &Value) -> Value {
     json!({ "nc_program": program, "dialect": dialect, "reading": reading, "mode": { "kind": "read" } })
 }
 
-fn read(job: &Value) -> Result<Answer<Outcome>, Failure> {
+pub(crate) fn read(job: &Value) -> Result<Answer<Outcome>, Failure> {
     let mut parsed: <ProgramCompensation as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
     let mut violations = Violations::default();
     parsed.check(&mut violations);
@@ -58,10 +58,10 @@ fn word(finding: &Finding) -> String {
 }
 
 /// Line, kind and numbers of a move, by names of the reference.
-type Row = serde_json::Map<String, Value>;
+pub(crate) type Row = serde_json::Map<String, Value>;
 
 /// The moves of an answer, one by one.
-fn rows(outcome: &Outcome) -> Vec<Row> {
+pub(crate) fn rows(outcome: &Outcome) -> Vec<Row> {
     let columns = serde_json::to_value(&outcome.moves).unwrap();
     let columns = columns.as_object().unwrap();
     let row = |i: usize| -> Row {
@@ -270,7 +270,7 @@ fn a_program_for_another_control_is_told_as_such() {
 }
 
 /// A part in moves: what every control can write.
-enum Step {
+pub(crate) enum Step {
     Rapid(f64, f64),
     Line(f64, f64),
     /// End and radius; clockwise or not.
@@ -281,7 +281,7 @@ enum Step {
     Tool(u32),
 }
 
-fn part(draw: &mut Draw) -> Vec<Step> {
+pub(crate) fn part(draw: &mut Draw) -> Vec<Step> {
     let round = |value: f64| (value * 1000.0).round() / 1000.0;
     let mut steps = vec![Step::Tool(1 + (draw.share() * 8.0) as u32)];
     steps.push(if draw.share() < 0.5 { Step::Spindle(500.0) } else { Step::Surface(180.0, 2500.0) });
@@ -313,10 +313,10 @@ fn part(draw: &mut Draw) -> Vec<Step> {
     steps
 }
 
-const DIALECTS: [&str; 5] = ["fanuc_a", "fanuc", "fanuc_c", "siemens", "linuxcnc"];
+pub(crate) const DIALECTS: [&str; 5] = ["fanuc_a", "fanuc", "fanuc_c", "siemens", "linuxcnc"];
 
 /// The part as this control has it: absolute or relative, as the draw has it.
-fn written(steps: &[Step], dialect: &str, draw: &mut Draw) -> String {
+pub(crate) fn written(steps: &[Step], dialect: &str, draw: &mut Draw) -> String {
     let mut text = match dialect {
         "fanuc_a" => "%\nO0001\nG21 G18 G40 G99\n",
         "fanuc" => "%\nO0001\nG21 G18 G40 G90 G95\n",
@@ -362,7 +362,7 @@ fn written(steps: &[Step], dialect: &str, draw: &mut Draw) -> String {
 }
 
 /// The moves without their lines, to the digits that relative words keep.
-fn without_lines(outcome: &Outcome) -> Vec<Row> {
+pub(crate) fn without_lines(outcome: &Outcome) -> Vec<Row> {
     let rounded = |row: Row| -> Row {
         let cell = |(name, cell): (String, Value)| {
             let cell = cell.as_f64().map_or(cell.clone(), |number| json!(format!("{:.6}", number + 0.0)));
@@ -373,7 +373,7 @@ fn without_lines(outcome: &Outcome) -> Vec<Row> {
     rows(outcome).into_iter().map(rounded).collect()
 }
 
-fn draws(in_the_suite: u64) -> u64 {
+pub(crate) fn draws(in_the_suite: u64) -> u64 {
     std::env::var("PRECUT_READINGS").ok().and_then(|text| text.parse().ok()).unwrap_or(in_the_suite)
 }
 
@@ -425,117 +425,6 @@ fn what_says_nothing_changes_nothing() {
             let answer = read(&job(&dressed, dialect, &json!({ "block_delete": true })));
             let answer = answer.unwrap_or_else(|e| panic!("{e:?}\n{dressed}"));
             assert_eq!(without_lines(&answer.output), plain, "{dialect}:\n{dressed}");
-        }
-    }
-}
-
-/// What is put into programs.
-const PIECES: &[&str] = &[
-    "G71",
-    "G70",
-    "P1",
-    "Q2",
-    "N1",
-    "N2",
-    "G90",
-    "G92",
-    "X",
-    "Z-5.",
-    "U",
-    "W",
-    "#",
-    "[",
-    "(",
-    ")",
-    "\"",
-    "=",
-    "IC(",
-    "CR=",
-    "CYCLE97(",
-    "G2",
-    "G3",
-    "R-5.",
-    "I",
-    "K",
-    "\n",
-    "\r",
-    "\r\n",
-    " ",
-    "\t",
-    "%",
-    "/",
-    ",",
-    "-",
-    ".",
-    "99999999999",
-    "M99",
-    "O1",
-    "T0101",
-    "G50",
-    "S",
-    "F0.1",
-    "G28",
-    "ü",
-    "\u{feff}",
-    "\0",
-    "G73",
-    "D0.001",
-    "é=",
-    "LIMS=",
-    ":",
-    "<",
-    ">",
-];
-
-/// Bytes of any kind, and programs with some of their bytes changed: an answer or a refusal, never a panic, and every fault has
-/// its place. `PRECUT_READINGS=1000000` goes on for long.
-#[test]
-fn any_text_is_read_or_refused() {
-    let texts: Vec<(String, String)> = ["reading.json", "refused.json"]
-        .iter()
-        .flat_map(|name| cases(name))
-        .map(|case| (case["program"].as_str().unwrap().to_owned(), case["dialect"].as_str().unwrap().to_owned()))
-        .collect();
-    for seed in 0..draws(1500) {
-        let mut draw = Draw::new(77 + seed);
-        let mut pick = |count: usize| ((draw.share() * count as f64) as usize).min(count - 1);
-        let (text, own) = &texts[pick(texts.len())];
-        let mut text = if pick(4) == 0 { String::new() } else { text.clone() };
-        for _ in 0..=pick(12) {
-            let mut at = pick(text.len() + 1);
-            while !text.is_char_boundary(at) {
-                at -= 1;
-            }
-            if pick(3) == 0 && at < text.len() {
-                text.remove(at);
-            } else {
-                text.insert_str(at, PIECES[pick(PIECES.len())]);
-            }
-        }
-        let dialect = if pick(3) == 0 { DIALECTS[pick(5)] } else { own };
-        let reading = match pick(4) {
-            0 => json!({ "decimal_point": "as_increments" }),
-            1 => json!({ "decimal_point": "as_units", "block_delete": true }),
-            2 => json!({ "start": { "x_diameter_mm": 50, "z_mm": 5 }, "tool": "1" }),
-            _ => json!({}),
-        };
-        if text.is_empty() {
-            continue;
-        }
-        match read(&job(&text, dialect, &reading)) {
-            Ok(answer) => {
-                let finite = serde_json::to_string(&answer.output).unwrap();
-                assert!(!finite.contains("NaN") && !answer.output.moves.line.is_empty(), "{text:?}");
-            }
-            Err(Failure::NotRead { findings, total }) => {
-                assert!(!findings.is_empty() && total >= findings.len());
-                let lines = text.split(['\n', '\r']).count();
-                for fault in &findings {
-                    assert!((1.0..=lines as f64).contains(&number(fault, "line")), "{fault:?}: {text:?}");
-                    assert!(fault.code == "dialect_looks_like" || number(fault, "column") >= 1.0, "{fault:?}");
-                }
-            }
-            Err(other) => panic!("{other:?}: {text:?}"),
         }
     }
 }

@@ -89,7 +89,7 @@ const META: Meta = Meta {
     },
     figures: figure::FIGURES,
     tables: table::TABLES,
-    has_program: false,
+    program: None,
 };
 
 /// The entry of studies over the calculators of a registry.

@@ -273,9 +273,12 @@ pub(super) fn file_of(text: &str) -> Content {
 
 /// The forms of an answer beside JSON, whichever calculator made it.
 pub(super) fn other_forms(mut response: ResponseBuilder) -> ResponseBuilder {
-    for (media, text) in
-        [(Media::Csv, "One of its tables."), (Media::Svg, "One of its figures."), (Media::Gcode, "Its program.")]
-    {
+    for (media, text) in [
+        (Media::Csv, "One of its tables."),
+        (Media::Svg, "One of its figures."),
+        (Media::Gcode, "Its program."),
+        (Media::Diff, "What changed in the program of its job."),
+    ] {
         response = response.content(media.essence(), text_of(text));
     }
     for (media, text) in [(Media::Xlsx, "All of its tables as a workbook."), (Media::Pdf, "All of it as a report.")] {

@@ -1,6 +1,6 @@
 //! A calculator's operation, from its declaration.
 
-use precut_calc::calculator::{CalculatorKind, Example, Meta};
+use precut_calc::calculator::{CalculatorKind, Example, Meta, ProgramOrigin};
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
@@ -11,7 +11,9 @@ use utoipa::openapi::link::LinkBuilder;
 use utoipa::openapi::path::{HttpMethod, OperationBuilder, ParameterIn, PathItem};
 use utoipa::openapi::request_body::{RequestBody, RequestBodyBuilder};
 use utoipa::openapi::response::ResponseBuilder;
-use utoipa::openapi::schema::{AdditionalProperties, ArrayBuilder, ObjectBuilder, SchemaType, Type};
+use utoipa::openapi::schema::{
+    AdditionalProperties, ArrayBuilder, KnownFormat, ObjectBuilder, SchemaFormat, SchemaType, Type,
+};
 use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 
 use super::{jobs, parts};
@@ -111,13 +113,13 @@ fn body(entry: &Entry, job: &str, examples: &[Example]) -> RequestBody {
         .description(Some("The job. Whatever is left out takes its default, which the answer's `input` shows."))
         .required(Some(Required::True))
         .content("application/json", json);
-    if entry.takes_tables() {
+    if entry.takes_files() {
         body = body.content("multipart/form-data", multipart(entry, job));
     }
     body.build()
 }
 
-/// The job as one part, its measured tables as files beside it.
+/// The job as one part, its measured tables and long texts as files beside it.
 fn multipart(entry: &Entry, job: &str) -> Content {
     let mut form = ObjectBuilder::new()
         .property("job", Ref::from_schema_name(job))
@@ -128,6 +130,13 @@ fn multipart(entry: &Entry, job: &str) -> Content {
             "The table as CSV in place of the field of the same name: header `name [unit]` or `name_unit`.",
         ));
         form = form.property(table, schema);
+    }
+    for text in entry.text_names() {
+        let file = ObjectBuilder::new()
+            .schema_type(SchemaType::new(Type::String))
+            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+            .description(Some("The file in place of the text of the same name, byte for byte."));
+        form = form.property(text, file);
     }
     let mut encoding = Encoding::default();
     encoding.content_type = Some("application/json".to_owned());
@@ -161,7 +170,13 @@ fn answered(meta: &Meta, answer: &str) -> ResponseBuilder {
             Media::Json => continue,
             Media::Csv => "One table; header `name [unit]`, decimal points, UTF-8.",
             Media::Svg => "One figure, worth printing.",
+            Media::Gcode if meta.program == Some(ProgramOrigin::Brought) => {
+                "The job's own program as it is given back, in its own encoding; `422` where none is."
+            }
             Media::Gcode => "The program for the machine; `422` while a station has no command.",
+            Media::Diff => {
+                "What changed in the job's program, as a unified diff in its encoding; empty where nothing did."
+            }
             Media::Xlsx => "A workbook: the answer in words, its inputs, and every table on a sheet of its own.",
             Media::Pdf => "A report: verdict, warnings, pictures, numbers, inputs, tables, equations (PDF/A-2a).",
         };

@@ -31,7 +31,7 @@ pub use hypothesis::{
     Expansions, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Range, Shape, Treatment, Variable,
 };
 pub use measured::{Measured, MeasuredRow};
-pub use program::{Block, Dialect, Program, ProgramEnd};
+pub use program::{Block, Dialect, Program, ProgramEncoding, ProgramEnd, ProgramOrigin, ReturnedProgram};
 pub use ranges::{ConditionRange, Ranges};
 pub use table::{Cells, Column, Table};
 pub(crate) use user_formula::{FormulaRoom, values_of_formula};
@@ -69,6 +69,16 @@ pub trait Calculator: Send + Sync + 'static {
     /// The program for the machine, where the answer is one: `None` if this calculator has none,
     /// `Err` if this answer has none (a station without a command).
     fn program(_input: &Self::Input, _output: &Self::Output) -> Option<Result<Program, Failure>> {
+        None
+    }
+
+    /// The program that the job brought along, as the answer gives it back: `None` if jobs of this calculator bring none, `Err` if
+    /// this answer has none. `made_by` names the answer, for a program in which that shall stand.
+    fn returned(
+        _input: &Self::Input,
+        _output: &Self::Output,
+        _made_by: &str,
+    ) -> Option<Result<ReturnedProgram, Failure>> {
         None
     }
 
@@ -176,8 +186,8 @@ pub struct Meta {
     pub figures: &'static [&'static str],
     /// `id`s of the tables it makes.
     pub tables: &'static [&'static str],
-    /// Whether it can make a program for a machine.
-    pub has_program: bool,
+    /// Where the programs for a machine come from that its answers have; `None` of one whose answers have none.
+    pub program: Option<ProgramOrigin>,
 }
 
 /// Something of a job by which a person knows it again. Pointers lead into the filled job; `*` stands for every item of

@@ -80,7 +80,7 @@ impl Calculator for ComplianceFit {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut Job) {

@@ -68,7 +68,7 @@ pub use uncertain::{DeflectionCorrelation, DeflectionQuantity, DeflectionUncerta
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
-    Program, Table,
+    Program, ProgramOrigin, Table,
 };
 use crate::certainty::{self, Conformance};
 use crate::force;
@@ -143,7 +143,7 @@ impl Calculator for DeflectionCompensation {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: true,
+        program: Some(ProgramOrigin::Made),
     };
 
     fn fill(job: &mut Job) {

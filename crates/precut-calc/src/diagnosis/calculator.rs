@@ -63,7 +63,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut Self::Input) {

@@ -74,7 +74,7 @@ pub use risk::Risk;
 
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Place, Program,
-    Table,
+    ProgramOrigin, Table,
 };
 use crate::shaft::places;
 use crate::{force, shaft};
@@ -155,7 +155,7 @@ impl Calculator for FeedSchedule {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: true,
+        program: Some(ProgramOrigin::Made),
     };
 
     fn fill(job: &mut Job) {

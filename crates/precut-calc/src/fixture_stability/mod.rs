@@ -143,7 +143,7 @@ impl Calculator for FixtureStability {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut FixtureJob) {

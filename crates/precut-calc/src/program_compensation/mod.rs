@@ -22,10 +22,10 @@ use std::collections::BTreeSet;
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
-    Monitor, Table,
+    Monitor, ProgramOrigin, ReturnedProgram, Table,
 };
 
-use answer::{advice, output, picture};
+use answer::{advice, output, picture, returned};
 use model::{correction, reader, stock, yielding};
 
 /// Reads programs for lathes.
@@ -72,7 +72,7 @@ impl Calculator for ProgramCompensation {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: Some(ProgramOrigin::Brought),
     };
 
     fn fill(job: &mut Job) {
@@ -138,6 +138,11 @@ impl Calculator for ProgramCompensation {
 
     fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
         picture::tables(outcome)
+    }
+
+    fn returned(job: &Job, outcome: &Outcome, made_by: &str) -> Option<Result<ReturnedProgram, Failure>> {
+        let nothing = || Failure::OutOfModel(Finding::new("no_program_returned", "/mode/kind"));
+        Some(outcome.compensation.as_ref().map(|one| returned::returned(job, one, made_by)).ok_or_else(nothing))
     }
 }
 
@@ -209,7 +214,13 @@ const CODES: Codes = Codes {
         crate::deflection_compensation::EFFECT_CODES,
         crate::force::FAULT_CODES,
     ],
-    failures: &[reader::FAULT_CODES, stock::FAILURE_CODES, yielding::FAILURE_CODES, correction::FAILURE_CODES],
+    failures: &[
+        reader::FAULT_CODES,
+        stock::FAILURE_CODES,
+        yielding::FAILURE_CODES,
+        correction::FAILURE_CODES,
+        &["no_program_returned"],
+    ],
     warnings: &[
         reader::WARNING_CODES,
         advice::WARNING_CODES,

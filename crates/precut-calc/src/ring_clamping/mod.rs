@@ -86,7 +86,7 @@ impl Calculator for RingClamping {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut Job) {

@@ -142,7 +142,7 @@ impl Calculator for RingRoundness {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: tables::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut Job) {

@@ -92,7 +92,7 @@ impl Calculator for FixtureIdentification {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(_job: &mut IdentificationJob) {}

@@ -78,8 +78,9 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
             Message::new("error_along_contour").with("smallest_error_um", smallest).with("largest_error_um", largest),
         );
     }
+    // What was asked for comes first.
     if let Some(compensation) = &outcome.compensation {
-        said.extend(of_compensation(outcome.lines, compensation));
+        said.splice(0..0, of_compensation(outcome.lines, compensation));
     }
     said
 }

@@ -3,3 +3,4 @@
 pub(super) mod advice;
 pub(super) mod output;
 pub(super) mod picture;
+pub(super) mod returned;

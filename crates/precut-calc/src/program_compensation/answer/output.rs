@@ -16,7 +16,19 @@ use super::super::model::yielding::{ContourError, CutPlace, Yielded, between, co
 #[schema(title = "ProgramCompensation")]
 pub struct Outcome {
     /// Lines of the program.
-    #[schema(extensions(("x-unit" = json!("1"))))]
+    #[schema(extensions(("x-unit" = json!("1")), ("x-program" = json!({
+        "text": "nc_program",
+        "changes": "/compensation/changes",
+        "figure": "program",
+        "places": [
+            { "of": "/moves", "x": "z_mm", "y": "x_diameter_mm", "is_path": true },
+            { "of": "/yielding/contour", "x": "z_mm", "y": "diameter_error_um", "from": "program_zero_z_mm" },
+        ],
+        "tells": [
+            { "of": "/yielding/lines", "fields": ["smallest_error_um", "largest_error_um"] },
+            { "of": "/yielding/cuts", "fields": ["depth_mm", "radial_force_n", "deflection_um"] },
+        ],
+    }))))]
     pub lines: usize,
     /// Moves that cut along a known path.
     #[schema(extensions(("x-unit" = json!("1"))))]

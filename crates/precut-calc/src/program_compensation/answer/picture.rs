@@ -8,7 +8,7 @@ use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
 use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, YieldedWork};
 
-pub(crate) const FIGURE_IDS: &[&str] = &["surface", "program", "errors"];
+pub(crate) const FIGURE_IDS: &[&str] = &["program"];
 pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes"];
 
 /// Codes of titles, axes and legends.
@@ -19,12 +19,8 @@ pub(crate) const LABEL_CODES: &[&str] = &[
     "moves_rapid",
     "moves_feed",
     "moves_arc",
-    "surface_z",
-    "surface_diameter",
     "surface_of_blank",
     "surface_of_program",
-    "surface_left",
-    "error_along",
     "error_of_diameter",
     "error_as_programmed",
     "error_as_corrected",
@@ -33,7 +29,40 @@ pub(crate) const LABEL_CODES: &[&str] = &[
 /// Chords of a quarter in the picture.
 const CHORDS_OF_QUARTER: f64 = 12.0;
 
+/// The half plane of the program with blank, moves and what is left; below it, on the same axis, the error along the contour.
 pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
+    let zero_mm = job.program_zero_z_mm.unwrap_or(0.0);
+    let (mut items, left) = match job.stock.as_ref().zip(outcome.surface.as_ref()) {
+        Some((stock, surface)) => {
+            let [blank, left] = outlines(stock, surface, zero_mm);
+            (vec![blank], Some(left))
+        }
+        None => (Vec::new(), None),
+    };
+    items.extend(moves(job, outcome));
+    items.extend(left);
+    let panel = |y, height, items| Panel { y, height, items };
+    let mut panels = vec![panel(Axis::linear("program_diameter", "mm"), 3.0, items)];
+    if let Some(yielding) = outcome.yielding.as_ref().filter(|yielding| yielding.contour.z_mm.len() > 1) {
+        let before = error_along("error_as_programmed", &yielding.contour, zero_mm, Role::Before);
+        let after = outcome.compensation.as_ref().map(|one| &one.contour).filter(|along| !along.z_mm.is_empty());
+        let after = after.map(|along| error_along("error_as_corrected", along, zero_mm, Role::After));
+        let items = [before].into_iter().chain(after).collect();
+        panels.push(panel(Axis::linear("error_of_diameter", "um"), 2.0, items));
+    }
+    panels.retain(|panel| !panel.items.is_empty());
+    let program = Figure {
+        id: "program",
+        title: Message::new("program_moves"),
+        frame: Frame::Stacked,
+        x: Axis::linear("program_z", "mm"),
+        panels,
+    };
+    if program.panels.is_empty() { Vec::new() } else { vec![program] }
+}
+
+/// Ways of the tool.
+fn moves(job: &Job, outcome: &Outcome) -> Vec<Item> {
     let start = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
     let mut lines = [Curve::new("moves_rapid"), Curve::new("moves_feed"), Curve::new("moves_arc")];
     for path in outcome.moves.paths(start) {
@@ -46,50 +75,14 @@ pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     }
     let roles = [Role::Comparison, Role::Command, Role::Command];
     let drawn = lines.into_iter().zip(roles).filter(|(curve, _)| !curve.x.is_empty());
-    let items: Vec<Item> =
-        drawn.map(|(curve, role)| Item::Line { name: curve.name, x: curve.x, y: curve.y, role }).collect();
-    let one = |id, title, x, y, items| Figure {
-        id,
-        title: Message::new(title),
-        frame: Frame::Stacked,
-        x: Axis::linear(x, "mm"),
-        panels: vec![Panel { y: Axis::linear(y, "mm"), height: 1.0, items }],
-    };
-    let mut figures = Vec::new();
-    if let Some((stock, surface)) = job.stock.as_ref().zip(outcome.surface.as_ref()) {
-        let items = outlines(stock, surface);
-        figures.push(one("surface", "surface_left", "surface_z", "surface_diameter", items));
-    }
-    if !items.is_empty() {
-        figures.push(one("program", "program_moves", "program_z", "program_diameter", items));
-    }
-    if let Some(yielding) = outcome.yielding.as_ref().filter(|yielding| yielding.contour.z_mm.len() > 1) {
-        figures.push(errors(yielding, outcome.compensation.as_ref().map(|compensation| &compensation.contour)));
-    }
-    figures
-}
-
-/// The error along the contour, as it is and as the corrected program leaves it.
-fn errors(yielding: &YieldedWork, corrected: Option<&ErrorAlong>) -> Figure {
-    let mut items = vec![error_along("error_as_programmed", &yielding.contour, Role::Before)];
-    items.extend(
-        corrected
-            .filter(|corrected| !corrected.z_mm.is_empty())
-            .map(|corrected| error_along("error_as_corrected", corrected, Role::After)),
-    );
-    Figure {
-        id: "errors",
-        title: Message::new("error_along"),
-        frame: Frame::Stacked,
-        x: Axis::linear("surface_z", "mm"),
-        panels: vec![Panel { y: Axis::linear("error_of_diameter", "um"), height: 1.0, items }],
-    }
+    drawn.map(|(curve, role)| Item::Line { name: curve.name, x: curve.x, y: curve.y, role }).collect()
 }
 
 /// An error with gaps where another line goes on.
-fn error_along(name: &'static str, along: &ErrorAlong, role: Role) -> Item {
+fn error_along(name: &'static str, along: &ErrorAlong, zero_mm: f64, role: Role) -> Item {
     let (mut x, mut y) = (Vec::new(), Vec::new());
-    for (i, (&z, &error)) in along.z_mm.iter().zip(&along.diameter_error_um).enumerate() {
+    for (i, (z, &error)) in along.z_mm.iter().zip(&along.diameter_error_um).enumerate() {
+        let z = z - zero_mm;
         if i > 0 && along.line[i - 1] != along.line[i] {
             x.push(z);
             y.push(None);
@@ -100,8 +93,8 @@ fn error_along(name: &'static str, along: &ErrorAlong, role: Role) -> Item {
     Item::Line { name, x, y, role }
 }
 
-/// The blank and what is left of it.
-fn outlines(stock: &ProgramStock, surface: &LeftSurface) -> Vec<Item> {
+/// The blank and what is left of it, from program zero.
+fn outlines(stock: &ProgramStock, surface: &LeftSurface, zero_mm: f64) -> [Item; 2] {
     let mut left = Curve::new("surface_of_program");
     for i in 0..surface.z_start_mm.len() {
         let ends =
@@ -125,11 +118,12 @@ fn outlines(stock: &ProgramStock, surface: &LeftSurface) -> Vec<Item> {
     }
     let blank = Item::Line {
         name: "surface_of_blank",
-        x: stock.profile.iter().map(|row| row.z_mm).collect(),
+        x: stock.profile.iter().map(|row| row.z_mm - zero_mm).collect(),
         y: stock.profile.iter().map(|row| Some(row.diameter_mm)).collect(),
         role: Role::Stock,
     };
-    vec![blank, Item::Line { name: left.name, x: left.x, y: left.y, role: Role::Part }]
+    let x = left.x.into_iter().map(|z| z - zero_mm).collect();
+    [blank, Item::Line { name: left.name, x, y: left.y, role: Role::Part }]
 }
 
 /// Pieces of one kind with gaps between them.

@@ -7,6 +7,7 @@ use super::input::{Job, ModeKind};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &[
+    "not_in_encoding",
     "program_zero_missing",
     "tools_missing",
     "profile_falls_back",
@@ -29,6 +30,9 @@ const OUTSIDE: [u8; 5] = [0, 3, 4, 8, 9];
 
 impl Check for Job {
     fn check(&self, violations: &mut Violations) {
+        if let Some(outside) = self.nc_program.chars().find(|&character| !self.reading.encoding.has(character)) {
+            violations.add(Finding::new("not_in_encoding", "/reading/encoding").with("character", outside.to_string()));
+        }
         self.check_tools(violations);
         self.check_holding(violations);
         for (i, keep_out) in self.keep_out.iter().enumerate() {

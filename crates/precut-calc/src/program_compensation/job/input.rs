@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::calculator::Dialect;
+use crate::calculator::{Dialect, ProgramEncoding};
 use crate::deflection_compensation::{Carriage, Gravity, Holding, Segment, Shaft, Support, Theory};
 use crate::effects::{DeflectionConditions, DeflectionEffect};
 use crate::force::ForceModel;
@@ -13,8 +13,8 @@ use crate::force::ForceModel;
 #[serde(deny_unknown_fields)]
 #[schema(title = "ProgramCompensationJob")]
 pub struct Job {
-    /// The program as it is, with its line ends.
-    #[schema(min_length = 1, max_length = 8_000_000, example = "%\nO0042\nN10 G21 G18 G40 G99\n", extensions(("x-lines" = json!(true))))]
+    /// The program as it is, with its line ends; as a file part of `multipart/form-data`, its bytes.
+    #[schema(min_length = 1, max_length = 8_000_000, example = "%\nO0042\nN10 G21 G18 G40 G99\n", extensions(("x-text-file" = json!("reading/encoding"))))]
     pub nc_program: String,
     /// The control that the program is for. It is never guessed.
     #[schema(example = "fanuc_a")]
@@ -266,6 +266,10 @@ pub struct ProgramTool {
 #[serde(deny_unknown_fields)]
 #[schema(as = ProgramReading)]
 pub struct Reading {
+    /// Which bytes its characters are, for the bytes that are given back; of a file that is not UTF-8 it is Latin-1.
+    #[serde(default)]
+    #[schema(default = "utf_8", example = "utf_8")]
+    pub encoding: ProgramEncoding,
     /// What a word of Fanuc without a decimal point means. Needed where the program has such words: nothing is guessed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(inline, example = "as_increments")]
@@ -302,6 +306,7 @@ pub struct Reading {
 impl Default for Reading {
     fn default() -> Self {
         Self {
+            encoding: ProgramEncoding::default(),
             decimal_point: None,
             increment_um: one(),
             block_delete: false,
@@ -398,6 +403,10 @@ pub struct Mode {
     #[serde(default = "three")]
     #[schema(minimum = 2.0, maximum = 10_000.0, default = 3.0, example = 3.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("d_min")), ("x-advanced" = json!(true))))]
     pub minimum_diameter_mm: f64,
+    /// Whether a comment at the head of the program that is given back as a file says which answer changed it, and by how much.
+    #[serde(default)]
+    #[schema(default = false, example = false, extensions(("x-advanced" = json!(true))))]
+    pub stamp: bool,
 }
 
 fn eight() -> f64 {

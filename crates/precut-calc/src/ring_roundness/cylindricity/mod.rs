@@ -79,7 +79,7 @@ impl Calculator for CylindricityEvaluation {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(_job: &mut Job) {}

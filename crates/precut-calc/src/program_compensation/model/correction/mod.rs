@@ -24,6 +24,7 @@ use super::stock::{Part, Stroke, Turned, lines_that_finish, strokes};
 use super::yielding::{Driven, Instead, Yielded, yielding};
 
 use calls::Calls;
+pub(crate) use diff::unified;
 pub(crate) use plan::LeftAlone;
 pub use plan::WhyLeftAlone;
 pub(crate) use proof::{FAILURE_CODES, Proof, Transition};
@@ -124,7 +125,7 @@ pub(crate) fn corrected(
             proof: None,
         });
     };
-    let diff = diff::unified(&job.nc_program, &written.changed);
+    let diff = unified(&job.nc_program, &written.changed);
     let undersize = undersize(&before.nominal, &planned.real, &lines);
     let Written { text, changed, .. } = written;
     Ok(Corrected { text, changed, left_alone, diff, undersize, proof: Some(proof) })

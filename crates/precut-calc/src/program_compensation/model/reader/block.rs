@@ -752,8 +752,7 @@ impl<'a> Reader<'a> {
 
     /// The end of a program that others call is the end of what is read; before it, a return is a jump.
     fn end_of_subprogram(&mut self, spot: Spot<'a>, line: usize) {
-        let is_shown = |at: &usize| !self.line(*at).trim().is_empty();
-        if self.contour.is_some() || (line..self.extent.end).any(|at| is_shown(&at)) {
+        if self.contour.is_some() || (line..self.extent.end).any(|at| self.says_something(at)) {
             self.notes.fault(spot, "subprogram");
         }
         self.is_over = true;

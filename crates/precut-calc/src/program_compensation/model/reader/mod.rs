@@ -274,10 +274,14 @@ impl<'a> Reader<'a> {
 
     /// Says that something stands behind the end of the program.
     fn after_end(&mut self, from: usize) {
-        let shown = |at: &usize| !matches!(self.line(*at).trim().chars().next(), None | Some('(' | ';'));
-        if let Some(at) = (from..self.extent.end).find(shown) {
+        if let Some(at) = (from..self.extent.end).find(|&at| self.says_something(at)) {
             self.notes.warn(Spot { line: at + 1, column: 1, word: self.line(at) }, "lines_after_end");
         }
+    }
+
+    /// Whether more than blanks or a comment stands on a line.
+    fn says_something(&self, at: usize) -> bool {
+        !matches!(self.line(at).trim().chars().next(), None | Some('(' | ';'))
     }
 
     /// A move from where the tool is, which is then at its end.
