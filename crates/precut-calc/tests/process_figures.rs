@@ -30,6 +30,9 @@ struct Heard {
     hidden: Hidden,
 }
 
+/// That, and the delays of the charts.
+type Both = (Heard, Vec<u32>);
+
 /// Part by part until `after` parts past the report; nothing where something was reported before the change.
 fn heard(hidden: Hidden, series: &Series, after: u32) -> Option<Heard> {
     let mut watch = Watch::<DeflectionCompensation>::new(series.document.clone());
@@ -193,7 +196,7 @@ fn changes_are_found_named_and_dated() {
             let charts = CHARTS.iter().zip(&limits).map(|((_, chart), limit)| chart_delay(*chart, *limit, &white));
             (said, charts.collect::<Vec<u32>>())
         };
-        let all: Vec<(Heard, Vec<u32>)> = cases.par_iter().map(of).collect();
+        let all: Vec<Both> = cases.par_iter().map(of).collect();
         let found: Vec<&Heard> = all.iter().map(|(said, _)| said).filter(|said| said.delay < 99).collect();
         let share = |holds: &dyn Fn(&Heard, &Change) -> bool| {
             let count = found.iter().filter(|said| holds(said, said.change.as_ref().unwrap())).count();
@@ -206,7 +209,7 @@ fn changes_are_found_named_and_dated() {
         let right =
             share(&|said, change| change.verdict == ChangeVerdict::Named && is_own(said, &change.causes[0].kind));
         let within = |parts: u32| share(&|_, change| change.since_part.abs_diff(CHANGED) <= parts).1;
-        let delays = |of: &dyn Fn(&(Heard, Vec<u32>)) -> u32| median_and_90(all.iter().map(of).collect());
+        let delays = |of: &dyn Fn(&Both) -> u32| median_and_90(all.iter().map(of).collect());
         if is_measured {
             eprintln!("delta {delta}: {} of {} found", found.len(), all.len());
             for (place, (name, _)) in CHARTS.iter().enumerate() {

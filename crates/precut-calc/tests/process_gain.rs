@@ -85,7 +85,7 @@ fn the_job_of_the_next_part_gives_the_path_that_makes_it_straight() {
 #[test]
 fn what_a_part_would_have_been_on_the_path_of_the_base_job_lies_in_its_interval() {
     let (count, is_measured) = draws("PRECUT_PROCESS_GAINS", 4);
-    let (mut forms, mut held, mut of_parts, mut sums) = (0, 0, 0, 0);
+    let (mut forms, mut held, mut of_parts, mut sums) = (0_u32, 0, 0, 0);
     for seed in 0..count {
         let told = Told::of(500 + seed, 0.008);
         let allowed = told.shop.document.part_types["A"].job.tolerance.form_um.unwrap();
@@ -112,8 +112,8 @@ fn what_a_part_would_have_been_on_the_path_of_the_base_job_lies_in_its_interval(
         let [low, high] = gain.form_gain_interval_95;
         sums += usize::from((low..=high).contains(&total));
     }
-    let share = |own: usize, all: usize| own as f64 / all as f64;
-    let (form, parts, sum) = (share(held, forms), share(of_parts, count as usize), share(sums, count as usize));
+    let share = |own: usize, all: f64| own as f64 / all;
+    let (form, parts, sum) = (share(held, f64::from(forms)), share(of_parts, count as f64), share(sums, count as f64));
     if is_measured {
         eprintln!("held: form {form:.3}, parts saved {parts:.3}, form gained {sum:.3}");
         assert!((0.90..=0.99).contains(&form) && parts >= 0.90 && sum >= 0.90, "{form} {parts} {sum}");

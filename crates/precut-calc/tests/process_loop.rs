@@ -81,7 +81,9 @@ fn cut(controller: Controller, hidden: &Hidden, seed: u64, count: u32) -> Cut {
             Controller::Fixed => {}
             Controller::Mean(share) => {
                 let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-                taken.iter_mut().for_each(|own| *own += share * mean);
+                for own in &mut taken {
+                    *own += share * mean;
+                }
             }
             Controller::Rows(share) => taken.iter_mut().zip(&rows).for_each(|(own, um)| *own += share * um),
             Controller::Ours => {
