@@ -13,6 +13,7 @@ mod fixture;
 mod http;
 mod library;
 mod measure;
+mod milling;
 mod program;
 mod ring;
 mod roundness;

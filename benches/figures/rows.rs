@@ -14,6 +14,7 @@ use crate::fixture;
 use crate::http::{self, Bare, Clock, Exchange};
 use crate::library;
 use crate::measure::{Measured, Unit, cpu_time};
+use crate::milling::{self, Teeth};
 use crate::program;
 use crate::ring;
 use crate::roundness;
@@ -133,6 +134,31 @@ pub(crate) fn all() -> Vec<Row> {
             us(150_000.0),
             || fixture::probability(&["certainty"]),
         ),
+        row("milling, map 200 x 100 converged, 2 x 2 modes", Unit::Time, us(2e6), us(0.8e6), || {
+            milling::map(Teeth::Straight)
+        }),
+        row("the same with helix 30", Unit::Time, us(3e6), us(1.2e6), || milling::map(Teeth::Helical)),
+        row("the same with pitch of two values", Unit::Time, us(6e6), us(2.5e6), || milling::map(Teeth::UnevenPitch)),
+        row("milling, one multiplier, 2 x 2 modes", Unit::Time, us(2000.0), us(600.0), || {
+            milling::multiplier(Teeth::Straight)
+        }),
+        row("the same with unequal pitch and helix", Unit::Time, us(8000.0), us(3000.0), || {
+            milling::multiplier(Teeth::UnevenPitch)
+        }),
+        row("the same with unequal helix", Unit::Time, us(60_000.0), us(20_000.0), || {
+            milling::multiplier(Teeth::UnevenHelix)
+        }),
+        row(
+            "milling, boundary of 400 varying speeds, eight depths each",
+            Unit::Time,
+            us(5e6),
+            us(2e6),
+            milling::varying,
+        ),
+        row("milling, better speeds in full, 200 speeds", Unit::Time, us(1.5e6), us(0.5e6), || {
+            milling::answer(&serde_json::json!(["verdict", "speeds"]))
+        }),
+        row("milling, forced motion and error of the wall", Unit::Time, us(3000.0), us(1000.0), milling::forced),
         row("thirty zones, usage and feed steps: solver alone", Unit::Time, us(300.0), us(80.0), || feed::solver(30)),
         row("a hundred zones, the same", Unit::Time, us(1000.0), us(300.0), || feed::solver(100)),
         row("thirty zones through the general conic solver, 1e-8", Unit::Time, us(5000.0), None, || feed::conic(30)),

@@ -87,7 +87,7 @@ impl Calculator for MillingStability {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(job: &mut Job) {

@@ -78,7 +78,7 @@ impl Calculator for ReceptanceFit {
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
-        has_program: false,
+        program: None,
     };
 
     fn fill(_job: &mut Job) {}
