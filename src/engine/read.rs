@@ -379,7 +379,7 @@ fn check_schema(entry: &Entry, job: &mut Value, (parts, room): (&[FilePart], &Ro
 }
 
 /// Holds something to its schema, its tables read.
-pub(crate) fn check_body(entry: &Entry, body: &mut Value, tables: (&[TablePart], &Room)) -> Result<(), Error> {
+pub(crate) fn check_body(entry: &Entry, body: &mut Value, tables: (&[FilePart], &Room)) -> Result<(), Error> {
     check_schema(entry, body, tables).map_err(Found::told)
 }
 

@@ -10,7 +10,7 @@ use super::{ProcessError, canonical_text};
 use crate::engine::budget::Room;
 use crate::engine::read::check_body;
 use crate::engine::watch::{lift, not_watched};
-use crate::engine::{Body, Engine, Error, Shelf, TablePart};
+use crate::engine::{Body, Engine, Error, FilePart, Shelf};
 use crate::registry::{Entry, Observed, Registry, child};
 
 /// What the service adds to the options of a process.
@@ -136,7 +136,7 @@ pub(super) fn faulty(mut findings: Vec<Finding>) -> ProcessError {
 }
 
 /// A part as it is sent, held to its schema, its table read.
-pub(super) fn part(observed: &Observed, mut sent: Value, tables: &[TablePart]) -> Result<Value, ProcessError> {
+pub(super) fn part(observed: &Observed, mut sent: Value, tables: &[FilePart]) -> Result<Value, ProcessError> {
     check_body(&observed.part, &mut sent, (tables, &Room::default()))?;
     Ok(sent)
 }

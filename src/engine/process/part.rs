@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::body::{self, faulty, for_calculator};
 use super::live::{Coming, Live, coming, read};
 use super::{ProcessError, TRIES, canonical_text, said, too_many_parts};
-use crate::engine::{Engine, Error, Inner, Shelf, TablePart};
+use crate::engine::{Engine, Error, FilePart, Inner, Shelf};
 use crate::store::processes::{Addition, EntryKind, KeptPart, NewEntry, PartNow};
 
 /// What whoever changes something has seen of it.
@@ -68,7 +68,7 @@ impl Engine {
         &self,
         shelf: &Shelf,
         (process, part): (&str, &str),
-        (sent, tables): (Value, &[TablePart]),
+        (sent, tables): (Value, &[FilePart]),
         (precondition, owner): (Precondition, String),
     ) -> Result<PartAnswer, ProcessError> {
         let inner = &self.inner;

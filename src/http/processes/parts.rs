@@ -150,7 +150,7 @@ pub(super) async fn take(
     } else {
         match body::job(request, || true, &app.limits, app.engine.bodies()).await? {
             Body::Json(sent) => (parsed(&sent)?, Vec::new()),
-            Body::Parts { job, tables } => (parsed(&job)?, tables),
+            Body::Parts { job, files } => (parsed(&job)?, files),
         }
     };
     let condition = (precondition(&headers), owner);
