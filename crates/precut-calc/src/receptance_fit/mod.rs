@@ -68,12 +68,7 @@ impl Calculator for ReceptanceFit {
                 job: include_str!("examples/two_directions.json"),
             },
         ],
-        hallmarks: &[
-            Hallmark::Count("/files"),
-            Hallmark::Of("/modes"),
-            Hallmark::Of("/from_hz"),
-            Hallmark::Of("/to_hz"),
-        ],
+        hallmarks: &[Hallmark::Count("/files"), Hallmark::Of("/residuals")],
         study_outputs: &["/modes/0/frequency_hz", "/modes/0/damping_ratio", "/modes/0/mass_kg"],
         codes: CODES,
         figures: picture::FIGURE_IDS,
