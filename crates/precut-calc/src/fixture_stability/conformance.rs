@@ -196,9 +196,9 @@ impl<'a> Judged<'a> {
                 return Ok(Some(depth_mm));
             }
             if here > 0.0 {
-                low = Some((depth_mm, here))
+                low = Some((depth_mm, here));
             } else {
-                high = Some((depth_mm, here))
+                high = Some((depth_mm, here));
             }
             depth_mm = match (low, high) {
                 (Some((from, above)), Some((to, below))) => {

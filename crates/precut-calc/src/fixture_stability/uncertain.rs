@@ -77,7 +77,9 @@ impl FixtureQuantity {
             Self::MovableJointStiffness => stiffen(&mut holding.left),
             Self::FixedJointStiffness => stiffen(&mut holding.right),
             Self::Damping => {
-                [&mut holding.left, &mut holding.right].into_iter().for_each(|of| of.damping_n_s_per_mm *= factor);
+                for joint in [&mut holding.left, &mut holding.right] {
+                    joint.damping_n_s_per_mm *= factor;
+                }
             }
             Self::WorkpieceMass => holding.mass_kg *= factor,
             Self::CuttingForce => cutting.coefficient *= factor,
