@@ -1,5 +1,6 @@
 //! Processes under watch over HTTP: the reference stream of a tailstock that softens, fed part by part.
 
+use std::fmt::Write as _;
 use std::sync::OnceLock;
 
 use precut::registry::Registry;
@@ -18,6 +19,11 @@ async fn server() -> Server {
 fn stream() -> &'static Value {
     static STREAM: OnceLock<Value> = OnceLock::new();
     STREAM.get_or_init(|| process_file("r01-tailstock-softer.json"))
+}
+
+/// A measured row as CSV has it.
+fn csv_row(row: &Value) -> String {
+    format!("{},{}\n", row["z_mm"], row["diameter_deviation_um"])
 }
 
 /// The process of the stream without its parts.
@@ -417,7 +423,7 @@ async fn a_history_comes_as_a_table_and_a_part_as_a_bare_one() {
         for row in rows(&part) {
             let cells = [&c["edge"], &c["batch"], &c["tool_path_at_start_m"], &c["warm_time_at_start_min"]].map(comma);
             let measured = [&row["z_mm"], &row["diameter_deviation_um"]].map(comma).join(";");
-            table.push_str(&format!("p-{number};{number};A;{};{measured}\n", cells.join(";")));
+            let _ = writeln!(table, "p-{number};{number};A;{};{measured}", cells.join(";"));
         }
     }
     let post = server.client.post(server.url("/v1/processes/table/parts")).header("content-type", "text/csv");
@@ -426,8 +432,7 @@ async fn a_history_comes_as_a_table_and_a_part_as_a_bare_one() {
     assert_eq!(status, 200, "{text}");
     let last = part(22);
     let c = &last["conditions"];
-    let bare: String =
-        rows(&last).iter().map(|row| format!("{},{}\n", row["z_mm"], row["diameter_deviation_um"])).collect();
+    let bare: String = rows(&last).iter().map(csv_row).collect::<Vec<_>>().concat();
     let query = format!(
         "number=22&part_type=A&edge={}&batch={}&tool_path_at_start_m={}&warm_time_at_start_min={}",
         c["edge"],
@@ -583,12 +588,7 @@ async fn the_command_line_keeps_a_process_in_a_folder_and_asks_a_service() {
     let (code, said, complaint) = run(&[&["add", "shaft-560", &first], &here[..]].concat());
     assert_eq!(code, Some(0), "{complaint}");
     assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["state"], "learning");
-    let rows: String = part(2)["measurements"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|row| format!("{},{}\n", row["z_mm"], row["diameter_deviation_um"]))
-        .collect();
+    let rows: String = part(2)["measurements"].as_array().unwrap().iter().map(csv_row).collect::<Vec<_>>().concat();
     let table = folder.path().join("p-2.csv");
     std::fs::write(&table, format!("z_mm,diameter_deviation_um\n{rows}")).unwrap();
     let conditions: Vec<String> = part(2)["conditions"]
@@ -598,7 +598,9 @@ async fn the_command_line_keeps_a_process_in_a_folder_and_asks_a_service() {
         .map(|(name, value)| format!("{name}={}", value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)))
         .collect();
     let mut add = vec!["add", "shaft-560", table.to_str().unwrap(), "--number", "2"];
-    conditions.iter().for_each(|condition| add.extend(["--condition", condition]));
+    for condition in &conditions {
+        add.extend(["--condition", condition]);
+    }
     add.extend(here);
     let (code, said, complaint) = run(&add);
     assert_eq!(code, Some(0), "{complaint}");
