@@ -161,7 +161,9 @@ fn drawn(job: &Value, draw: &mut Draw) -> Value {
             }
             other => panic!("{other}"),
         };
-        fields.iter().for_each(|pointer| scale(&mut drawn, pointer, factor));
+        for pointer in fields {
+            scale(&mut drawn, pointer, factor);
+        }
     }
     drawn["uncertainty"] = json!({ "defaults": false });
     with(&drawn, "/analyses", json!(["clamp_force"]))

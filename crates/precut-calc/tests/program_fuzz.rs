@@ -200,7 +200,7 @@ const LETTERS: &[u8] = b"GXZFSTNM0123456789.- \n\r%();";
 fn any_bytes_come_back_as_they_were() {
     for seed in 0..draws(400) {
         let mut pick = Pick(Draw::new(9_000 + seed));
-        let bytes: Vec<u8> = (0..pick.of(300) + 1)
+        let bytes: Vec<u8> = (0..=pick.of(300))
             .map(|_| match pick.of(3) {
                 0 => pick.of(256) as u8,
                 _ => LETTERS[pick.of(LETTERS.len())],
