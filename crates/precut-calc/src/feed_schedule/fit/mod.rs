@@ -44,7 +44,7 @@ impl Calculator for MachinabilityFit {
     const META: Meta = Meta {
         id: "machinability-fit",
         kind: CalculatorKind::Evaluation,
-        version: 2,
+        version: 3,
         title: "Machinability models from trials",
         question: "Which models of roughness, tool life and force do my own trials give, and how far can they be trusted?",
         summary: "From a table of trials: power laws or semi-logarithmic models of every measured output in the form that \
