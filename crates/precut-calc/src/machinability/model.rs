@@ -144,7 +144,7 @@ pub struct CoefficientCovariance {
     #[schema(min_items = 1, max_items = 5, example = json!(["constant", "speed_exponent", "feed_exponent"]))]
     pub order: Vec<ModelCoefficient>,
     /// Covariances, row by row; with further variables the constant's are those at their values.
-    #[schema(min_items = 1, max_items = 5, example = json!([[0.28, -0.056, 0.006], [-0.056, 0.013, 0.003], [0.006, 0.003, 0.011]]), extensions(("x-unit" = json!("1"))))]
+    #[schema(min_items = 1, max_items = 5, example = json!([[0.28, -0.056, 0.006], [-0.056, 0.013, 0.003], [0.006, 0.003, 0.011]]), extensions(("x-unit" = json!("1")), ("x-symbol" = json!("C"))))]
     pub matrix: Vec<Vec<f64>>,
     /// Degrees of freedom of the residuals behind it: limits are then those of Student's t; not said: of the normal distribution.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -23,7 +23,7 @@ const MOST_LINES: usize = 20;
 pub(crate) const WARNING_CODES: &[&str] = &[
     "rapid_in_stock",
     "hits_support",
-    "deflection_over_depth",
+    "pushed_off_over_depth",
     "no_cut",
     "plunge_at_feed_in_air",
     "nose_error_on_taper",
@@ -130,7 +130,7 @@ pub(crate) fn off_by_more_than_deep(yielded: &Yielded, finishing: &[usize]) -> O
     let lines: BTreeSet<usize> =
         yielded.places.iter().filter(|of| is_finishing(of.line)).filter(is_off).map(|of| of.line).collect();
     let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
-    (!lines.is_empty()).then(|| Finding::new("deflection_over_depth", "/nc_program").with("lines", lines))
+    (!lines.is_empty()).then(|| Finding::new("pushed_off_over_depth", "/nc_program").with("lines", lines))
 }
 
 /// Lines that find nothing to cut, and long ways at the feed through the air.
