@@ -198,7 +198,7 @@ fn forced_motions_are_those_of_the_reference() {
                 assert!((1e3 * found - given).abs() <= 1e-6 * swing, "{id} {name}: {} for {given}", 1e3 * found);
             }
         }
-        let force = statics(&milling, depth_mm);
+        let force = statics(&milling, depth_mm, &Unwatched).unwrap();
         for q in 0..3 {
             let given = expected["mean_force_n"][q].as_f64().unwrap();
             assert!((force.mean_n[q] - given).abs() < 1e-9 * 1e3, "{id}: {:?}", force.mean_n);

@@ -109,7 +109,7 @@ impl Calculator for MillingStability {
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         checkpoint(monitor)?;
         let case = Case::of(job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
-        let study = Study::new(job, case, monitor);
+        let study = Study::new(job, case, monitor)?;
         let (outcome, aside) = outcome(&study, cost(job).ms)?;
         let warnings = advice::warnings(&study, &outcome, &aside);
         let explanation = advice::explanation(&study, &outcome);

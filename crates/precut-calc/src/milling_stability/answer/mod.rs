@@ -65,11 +65,11 @@ pub(super) struct Aside {
 }
 
 impl<'a> Study<'a> {
-    pub(super) fn new(job: &'a Job, case: Case, monitor: &'a dyn Monitor) -> Self {
+    pub(super) fn new(job: &'a Job, case: Case, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
         let zeroth = if case.structure.modes.is_empty() { None } else { zeroth(&case.milling, &case.structure) };
         let examined_mm = examined_mm(job, &case, zeroth);
-        let torque_at_1_mm_n_m = statics(&case.milling, 1.0).torque_mean_n_mm / N_MM_PER_N_M;
-        Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, monitor }
+        let torque_at_1_mm_n_m = statics(&case.milling, 1.0, monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
+        Ok(Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, monitor })
     }
 
     pub(super) fn cut(&self) -> Cut<'_> {
@@ -115,7 +115,7 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let (job, case, monitor) = (study.job, &study.case, study.monitor);
     let mut aside = Aside::default();
     monitor.progress(0.02, Message::new("stage_multiplier"));
-    let force = forces(study);
+    let force = forces(study)?;
     let multiplier = if job.asks(Asked::Verdict) { Some(multiplier(study)?) } else { None };
     monitor.progress(0.1, Message::new("stage_intervals"));
     let seen = if job.asks(Asked::Intervals) { Some(scan_of(study, &study.cut(), false)?) } else { None };
@@ -256,15 +256,15 @@ fn engagement(study: &Study<'_>) -> MillingEngagement {
     }
 }
 
-fn forces(study: &Study<'_>) -> MillingForces {
+fn forces(study: &Study<'_>) -> Result<MillingForces, Failure> {
     let case = &study.case;
-    let found = statics(&case.milling, case.depth_mm);
+    let found = statics(&case.milling, case.depth_mm, study.monitor)?;
     let torque = found.torque_mean_n_mm / N_MM_PER_N_M;
     let power = power_kw(torque, case.rotation.spindle_rpm);
     let available = study.job.spindle.as_ref().map(|spindle| spindle.drive().available(case.rotation.spindle_rpm));
     let [power_depth_mm, torque_depth_mm] = study.drive_depths_mm(case.rotation.spindle_rpm);
     let turned = |of: model::Vector| of.map(|force| -force);
-    MillingForces {
+    Ok(MillingForces {
         tool: ForceOfSide::of(found.mean_n, found.min_n, found.max_n),
         work: ForceOfSide::of(turned(found.mean_n), turned(found.max_n), turned(found.min_n)),
         torque_mean_n_m: torque,
@@ -275,7 +275,7 @@ fn forces(study: &Study<'_>) -> MillingForces {
         torque_limit_n_m: available.and_then(|of| of.torque_n_m),
         power_depth_mm,
         torque_depth_mm,
-    }
+    })
 }
 
 /// The leading multiplier, and the share of each mode in its energy.

@@ -77,6 +77,14 @@ impl<'a> Edges<'a> {
         found
     }
 
+    /// How many multiplications an instant takes, roughly: every edge is looked at between its breaks, against all teeth where
+    /// one stands out.
+    pub(super) fn work(&self) -> usize {
+        const PER_CHIP: usize = 40;
+        let against = if self.milling.has_run_out() { self.milling.teeth.len() } else { 1 };
+        PER_CHIP * against * self.breaks.iter().map(Vec::len).sum::<usize>()
+    }
+
     /// Rotations between the passages that meet each other.
     pub fn delays_rad(&self) -> Vec<f64> {
         let mut found: Vec<f64> = Vec::new();

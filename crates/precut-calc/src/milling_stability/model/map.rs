@@ -11,6 +11,8 @@
 //! the element it falls into; what falls into the running element enters its matrix. The map acts on (q, r at the points of
 //! the period before that are met).
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::calculator::{Failure, Monitor, Pace};
@@ -116,7 +118,7 @@ impl Map {
             let pair = [map.times[index], map.times[index + 1]];
             let length_s = pair[1] - pair[0];
             let passage = map.passage(cut, rule, length_s);
-            pace.work(6 * rows.pow(3) + 60 * P * P * structure.modes.len())?;
+            pace.work(6 * rows.pow(3) + 60 * P * P * structure.modes.len() + 2 * P * edges.work())?;
             let assembled =
                 Assembly { cut, rule, edges: &edges, times: &map.times, index, acting }.element(&map.passages[passage]);
             let cut = match assembled {
@@ -141,7 +143,7 @@ impl Map {
 
     /// Gives every motion that is met its place.
     fn place(&mut self) {
-        let met: Vec<(usize, bool)> = self
+        let met: BTreeSet<(usize, bool)> = self
             .elements
             .iter()
             .filter_map(|element| element.cut.as_ref())

@@ -1,5 +1,6 @@
 //! Force, torque and what they do over a period with undisturbed chips (`milling/2.9`).
 
+use crate::calculator::{Failure, Monitor, Pace};
 use crate::num::quadrature::gauss_legendre;
 
 use super::cutter::{Milling, Vector};
@@ -26,7 +27,8 @@ pub struct Statics {
 }
 
 /// Of a depth.
-pub fn statics(milling: &Milling, depth_mm: f64) -> Statics {
+pub fn statics(milling: &Milling, depth_mm: f64, monitor: &dyn Monitor) -> Result<Statics, Failure> {
+    let mut pace = Pace::new(monitor);
     let edges = Edges::new(milling, depth_mm);
     let period = milling.period_rad();
     let mut ends = edges.rotations();
@@ -42,6 +44,7 @@ pub fn statics(milling: &Milling, depth_mm: f64) -> Statics {
     let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
     for pair in ends.windows(2) {
         let length = pair[1] - pair[0];
+        pace.work((POINTS + SAMPLES as usize) * edges.work())?;
         for (c, w) in points.iter().zip(&weights) {
             for (sum, value) in mean.iter_mut().zip(of(pair[0] + c * length)) {
                 *sum += value * w * length / period;
@@ -57,13 +60,13 @@ pub fn statics(milling: &Milling, depth_mm: f64) -> Statics {
         }
     }
     let three = |of: [f64; 4]| [of[0], of[1], of[2]];
-    Statics {
+    Ok(Statics {
         mean_n: three(mean),
         min_n: three(low),
         max_n: three(high),
         torque_mean_n_mm: mean[3],
         torque_max_n_mm: high[3],
-    }
+    })
 }
 
 /// Least and largest of evenly spaced samples, between them by a parabola.
