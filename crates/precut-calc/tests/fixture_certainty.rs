@@ -203,7 +203,7 @@ fn what_is_told_is_so_when_it_is_done() {
             }
         }
         let (then, of_then) = told(&outcome(&halved), "all");
-        let told = one.joint_probability_if_halved;
+        let told = one.joint_probability_if_halved.unwrap();
         eprintln!("{} halved: {then} +- {of_then}, told {told}", one.quantity);
         assert!((then - told).abs() < 0.02 + of_then, "{}: {then}, told {told}", one.quantity);
     }

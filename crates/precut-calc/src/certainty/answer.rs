@@ -92,9 +92,9 @@ pub struct Contribution {
     /// Share of the variance of what decides, to first order; null where quantities are correlated.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub share_of_variance: Option<f64>,
-    /// Probability that a part is good with half of its width, all else equal.
+    /// Probability of all limits with half of its width, all else equal; null where that would take long and nobody asked.
     #[schema(extensions(("x-unit" = json!("1"))))]
-    pub joint_probability_if_halved: f64,
+    pub joint_probability_if_halved: Option<f64>,
 }
 
 /// Something to do.

@@ -363,12 +363,12 @@ impl<'a> Judged<'a> {
                 source: one.source,
                 level: one.level,
                 share_of_variance: is_independent.then(|| share(index)),
-                joint_probability_if_halved: told(&self.uncertainties.halved(index))?,
+                joint_probability_if_halved: Some(told(&self.uncertainties.halved(index))?),
             });
         }
         contributions.sort_by(|a, b| {
-            let of = |one: &Contribution| one.share_of_variance.unwrap_or(one.joint_probability_if_halved);
-            of(b).total_cmp(&of(a))
+            let of = |one: &Contribution| one.share_of_variance.or(one.joint_probability_if_halved);
+            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
         });
         let common = self.common_share();
         let probability = bounded(joint.probability);

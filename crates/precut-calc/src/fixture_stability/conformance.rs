@@ -30,6 +30,8 @@ const SETS: [Together; 4] = [STABLE..=STABLE, CLOSED..=CLOSED, HELD..=HELD, STAB
 const ALL: usize = 3;
 /// Most lines of one scrambling.
 const MOST_LINES: usize = 16;
+/// Lines of one scrambling on which vises are compared.
+const COMPARED_LINES: usize = 4;
 /// A margin beyond this, of a logarithm, is as good as without end.
 const FAR: f64 = 50.0;
 /// Steps toward the depth of a probability, and how near to it is enough, in standard normal scores.
@@ -160,7 +162,7 @@ impl<'a> Judged<'a> {
         Ok(FixtureConformance {
             limits: self.limits.iter().map(kept).collect(),
             joint: JointlyKept { probability, numerical_error: joint.error, wanted, met: probability >= wanted },
-            contributions: there.contributions(joint.probability)?,
+            contributions: there.contributions(joint.probability, deepest_mm.is_some())?,
             depth_at_wanted_mm: match deepest_mm {
                 Some(deepest_mm) => self.depth_mm(self.case.working, wanted, deepest_mm)?,
                 None => None,
@@ -284,47 +286,52 @@ impl<'a> There<'a> {
         self.slopes = slopes;
     }
 
-    fn question(&self) -> Question<'_, { SETS.len() }> {
-        let effort = Effort { seed: self.of.job.uncertainty.seed, most_lines: MOST_LINES };
+    fn question(&self, most_lines: usize) -> Question<'_, { SETS.len() }> {
+        let effort = Effort { seed: self.of.job.uncertainty.seed, most_lines };
         Question { axis: &self.axis, sets: SETS, effort, monitor: self.of.monitor }
     }
 
     fn found(&self) -> Result<Found<{ SETS.len() }>, Failure> {
         let of = &self.of.uncertainties;
         let mut real = |g: &[f64]| self.of.tried(&of.values(g), self.working);
-        self.question().of_real(&mut real, &mut |g: &[f64]| Ok(self.near(of, g, true)))
+        self.question(MOST_LINES).of_real(&mut real, &mut |g: &[f64]| Ok(self.near(of, g, true)))
     }
 
-    /// The probability of all limits by the response surface alone.
-    fn nearly(&self, of: &Uncertainties<FixtureQuantity>, is_bent: bool) -> Result<f64, Failure> {
-        Ok(self.question().of(&mut |g: &[f64]| Ok(self.near(of, g, is_bent)))?.of[ALL].probability)
-    }
-
+    /// The probability of all limits by a straight model.
     fn linear_probability(&self) -> Result<f64, Failure> {
-        self.nearly(&self.of.uncertainties, false)
+        let of = &self.of.uncertainties;
+        Ok(self.question(MOST_LINES).of(&mut |g: &[f64]| Ok(self.near(of, g, false)))?.of[ALL].probability)
     }
 
-    /// What the doubt is made of. What half of a width makes of it is the difference by the response surface, on the same points.
-    fn contributions(&self, probability: f64) -> Result<Vec<Contribution>, Failure> {
+    /// What the doubt is made of; where it is asked, what half of a width makes of it: by how much the vises differ from those of
+    /// the whole width on the same few lines.
+    fn contributions(&self, probability: f64, asks: bool) -> Result<Vec<Contribution>, Failure> {
         let of = &self.of.uncertainties;
         let slopes = &self.slopes[self.deciding];
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
-        let now = self.nearly(of, true)?;
+        let on_few = |of: &Uncertainties<FixtureQuantity>| -> Result<f64, Failure> {
+            let mut real = |g: &[f64]| self.of.tried(&of.values(g), self.working);
+            Ok(self.question(COMPARED_LINES).of(&mut real)?.of[ALL].probability)
+        };
+        let now = if asks { Some(on_few(of)?) } else { None };
         let mut all = Vec::new();
         for (index, one) in of.of.iter().enumerate() {
             let share = if variance > 0.0 { slopes[index] * slopes[index] / variance } else { 0.0 };
-            let then = self.nearly(&of.halved(index), true)?;
+            let halved = match now {
+                Some(now) => Some(bounded(probability + on_few(&of.halved(index))? - now)),
+                None => None,
+            };
             all.push(Contribution {
                 quantity: one.quantity.name().to_owned(),
                 source: one.source,
                 level: one.level,
                 share_of_variance: of.scores.is_independent().then_some(share),
-                joint_probability_if_halved: bounded(probability + then - now),
+                joint_probability_if_halved: halved,
             });
         }
         all.sort_by(|a, b| {
-            let of = |one: &Contribution| one.share_of_variance.unwrap_or(one.joint_probability_if_halved);
-            of(b).total_cmp(&of(a))
+            let of = |one: &Contribution| one.share_of_variance.or(one.joint_probability_if_halved);
+            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
         });
         Ok(all)
     }

@@ -113,31 +113,52 @@ pub(super) struct Drawn {
 
 /// What is uncertain, and which probability is wanted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct FixtureUncertainty {
     /// What is uncertain, in place of what is usual or beside it.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 8, extensions(("x-advanced" = json!(true))))]
     pub quantities: Vec<FixtureUncertainQuantity>,
     /// Which of them go together.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 28, extensions(("x-advanced" = json!(true))))]
     pub correlations: Vec<FixtureCorrelation>,
     /// Whether what is usual is uncertain, too, where nothing is said of it: stiffness and damping of the joints, cutting force,
     /// clamp force, friction.
+    #[serde(default = "yes")]
     #[schema(default = true, example = true)]
     pub defaults: bool,
     /// Probability of a quiet cut that is wanted; below it the answer warns.
+    #[serde(default = "nineteen_of_twenty")]
     #[schema(exclusive_minimum = 0.0, exclusive_maximum = 1.0, default = 0.95, example = 0.95, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("P"))))]
     pub wanted_probability: f64,
     /// Seed of the points over which probabilities are integrated.
+    #[serde(default = "one")]
     #[schema(minimum = 0, maximum = 100_000_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("seed"))))]
     pub seed: u32,
 }
 
+fn yes() -> bool {
+    true
+}
+
+fn nineteen_of_twenty() -> f64 {
+    0.95
+}
+
+fn one() -> u32 {
+    1
+}
+
 impl Default for FixtureUncertainty {
     fn default() -> Self {
-        Self { quantities: Vec::new(), correlations: Vec::new(), defaults: true, wanted_probability: 0.95, seed: 1 }
+        Self {
+            quantities: Vec::new(),
+            correlations: Vec::new(),
+            defaults: yes(),
+            wanted_probability: nineteen_of_twenty(),
+            seed: one(),
+        }
     }
 }
 

@@ -4,6 +4,8 @@ use crate::material::Certainty;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, Type};
 
 /// How the polynomial in logarithms L = c_0 + a_V ln V + a_S ln S + a_t ln t + a_phi ln phi gives the
 /// output (`feed/2.1`).
@@ -144,12 +146,30 @@ pub struct CoefficientCovariance {
     #[schema(min_items = 1, max_items = 5, example = json!(["constant", "speed_exponent", "feed_exponent"]))]
     pub order: Vec<ModelCoefficient>,
     /// Covariances, row by row; with further variables the constant's are those at their values.
-    #[schema(min_items = 1, max_items = 5, example = json!([[0.28, -0.056, 0.006], [-0.056, 0.013, 0.003], [0.006, 0.003, 0.011]]), extensions(("x-unit" = json!("1")), ("x-symbol" = json!("C"))))]
+    #[schema(schema_with = covariances)]
     pub matrix: Vec<Vec<f64>>,
     /// Degrees of freedom of the residuals behind it: limits are then those of Student's t; not said: of the normal distribution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1.0, maximum = 1e6, example = 9.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("nu"))))]
     pub degrees_of_freedom: Option<f64>,
+}
+
+fn covariances() -> Schema {
+    let extensions = Extensions::builder().add("x-unit", "1").add("x-symbol", "C").build();
+    let covariance = ObjectBuilder::new()
+        .schema_type(SchemaType::new(Type::Number))
+        .minimum(Some(-1e9))
+        .maximum(Some(1e9))
+        .examples([0.28])
+        .extensions(Some(extensions));
+    let row = ArrayBuilder::new().items(covariance).min_items(Some(1)).max_items(Some(5));
+    ArrayBuilder::new()
+        .items(row)
+        .min_items(Some(1))
+        .max_items(Some(5))
+        .description(Some("Covariances, row by row; with further variables the constant's are those at their values."))
+        .examples([[[0.28, -0.056], [-0.056, 0.013]]])
+        .into()
 }
 
 /// A coefficient of a model, by its field.
