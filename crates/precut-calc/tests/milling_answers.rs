@@ -73,8 +73,8 @@ fn one_direction_is_that_of_fixture_stability() {
             "cut": { "width_mm": width, "offset_mm": offset, "depth_mm": depth, "spindle_speed_rpm": speed, "feed_mm_per_tooth": 0.1 },
             "fixture": {
                 "kind": "self_locking", "workpiece_mass_kg": 0.03993,
-                "movable_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.0025445 },
-                "fixed_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.0025445 }
+                "movable_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.002_544_5 },
+                "fixed_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.002_544_5 }
             },
             "limits": { "depth_max_mm": 4 }
         });
