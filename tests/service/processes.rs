@@ -342,7 +342,7 @@ async fn every_fault_of_a_process_or_a_part_is_told_at_once() {
     let mut cold = part(2);
     cold["conditions"].as_object_mut().unwrap().remove("warm_time_at_start_min");
     let told = problem(put(&server, "/v1/processes/shaft-560/parts/p-2", &cold).await, 422, "invalid_process").await;
-    assert_eq!(told["errors"][0]["code"], "part_condition_missing", "{told}");
+    assert_eq!(told["errors"][0]["code"], "condition_missing", "{told}");
     let mut few = part(2);
     few["measurements"].as_array_mut().unwrap().truncate(3);
     let few = put(&server, "/v1/processes/shaft-560/parts/p-2", &few).await;

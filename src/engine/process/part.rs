@@ -253,7 +253,7 @@ impl Inner {
         let own = |mut finding: Finding| {
             let place = finding.pointer.strip_prefix("/parts/")?;
             let rest = place.trim_start_matches(|digit: char| digit.is_ascii_digit());
-            if !place.starts_with('0') && finding.code == "part_condition_missing" {
+            if !place.starts_with('0') && finding.code == "condition_missing" {
                 // What the others leave out this one states.
                 finding.code = "part_condition_new";
             }

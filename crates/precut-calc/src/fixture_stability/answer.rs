@@ -267,7 +267,7 @@ fn certainty(study: &Study<'_>) -> Result<(Option<FixtureConformance>, Option<Pr
         return Ok((None, None));
     }
     let Some(judged) = Judged::of(job, case, &study.rules, *monitor)? else { return Ok((None, None)) };
-    monitor.progress(0.99, Message::new("stage_certainty"));
+    monitor.progress(0.995, Message::new("stage_certainty"));
     let conformance = judged.conformance(asked.then_some(study.examined_mm))?;
     let depths = if asked { probable_depths(study, &judged)? } else { None };
     Ok((Some(conformance), depths))

@@ -264,6 +264,15 @@ const CODES: Codes = Codes {
     failures: &[],
     warnings: &[advice::WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_multiplier", "stage_intervals", "stage_motion", "stage_boundary", "stage_map", "stage_done"]],
+    stages: &[&[
+        "stage_multiplier",
+        "stage_intervals",
+        "stage_motion",
+        "stage_boundary",
+        "stage_map",
+        "stage_speeds",
+        "stage_proposals",
+        "stage_done",
+    ]],
     labels: &[picture::LABEL_CODES],
 };
