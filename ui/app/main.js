@@ -148,7 +148,14 @@ function App() {
 
   const known = calculators?.find(({ id }) => id === page);
   useEffect(() => {
-    const names = { studies: t('studies'), jobs: t('jobs'), results: t('results'), models: t('models'), processes: t('processes'), library: t('records') };
+    const names = {
+      studies: t('studies'),
+      jobs: t('jobs'),
+      results: t('results'),
+      models: t('models'),
+      processes: t('processes'),
+      library: t('records'),
+    };
     document.title = known ? `${known.title} – precut` : names[page] ? `${names[page]} – precut` : 'precut';
   }, [page, known, spoken]);
   const first = useRef(true);

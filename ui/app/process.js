@@ -75,14 +75,15 @@ function Process({ name }) {
       await api.decideChange(name, change, decision);
       await look();
     });
-  const take = (query, accept, ending) =>
-    attempt(async () => save(await api.processFile(name, query, accept), `${name}.${ending}`));
+  const take = (query, accept, ending) => attempt(async () => save(await api.processFile(name, query, accept), `${name}.${ending}`));
   return html`
     <main class="plain process" id="main" tabindex="-1"><h1>${name}</h1>
       ${(failed ?? trouble) && html`<p class="problem" role="alert">${failed ?? trouble}</p>`}
       ${process && html`<${Say} ...${{ name, state, attempt, take }} />`}
-      ${figures.map(figure => html`<section key=${figure.id} class="picture-box" aria-label=${figure.title.text}><h2>${figure.title.text}</h2><${Picture} figure=${figure} height=${HEIGHT} />
-        <p><button type="button" onClick=${() => take(`/state?figure=${figure.id}`, 'image/svg+xml', 'svg')}>SVG<span class="hidden"> ${figure.title.text}</span></button></p></section>`)}
+      ${figures.map(
+        figure => html`<section key=${figure.id} class="picture-box" aria-label=${figure.title.text}><h2>${figure.title.text}</h2><${Picture} figure=${figure} height=${HEIGHT} />
+        <p><button type="button" onClick=${() => take(`/state?figure=${figure.id}`, 'image/svg+xml', 'svg')}>SVG<span class="hidden"> ${figure.title.text}</span></button></p></section>`,
+      )}
       ${state?.changes.length > 0 && html`<${Changes} changes=${state.changes} decide=${decide} />`}
       ${state?.measure_next?.length > 0 && html`<${Measure} list=${state.measure_next} />`}
       ${state && html`<p><button type="button" onClick=${() => take('/state?table=parts', 'text/csv', 'csv')}>${t('process_parts_csv')}</button></p>`}
