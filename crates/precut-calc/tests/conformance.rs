@@ -162,8 +162,8 @@ fn note_numbers(value: &Value, numbers: &mut BTreeSet<String>) {
 }
 
 /// Curves of a formula, drawn at places of their own: circles about a profile, a fit against what was measured, which is
-/// told by its logarithm; arcs of a program.
-const DRAWN_ANYWHERE: [&str; 11] = [
+/// told by its logarithm; arcs of a program, and a blank by the zero of its program.
+const DRAWN_ANYWHERE: [&str; 12] = [
     "least_squares_circle",
     "minimum_zone_circles",
     "minimum_zone_inner",
@@ -175,6 +175,7 @@ const DRAWN_ANYWHERE: [&str; 11] = [
     "fit_outlier_limit",
     "moves_arc",
     "surface_of_program",
+    "surface_of_blank",
 ];
 
 /// No axis without its true scale: what is drawn stands at a number of the tables, the answer or the job. A profile closes
