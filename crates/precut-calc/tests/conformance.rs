@@ -163,7 +163,7 @@ fn note_numbers(value: &Value, numbers: &mut BTreeSet<String>) {
 
 /// Curves of a formula, drawn at places of their own: circles about a profile, a fit against what was measured, which is
 /// told by its logarithm; arcs of a program, and a blank by the zero of its program.
-const DRAWN_ANYWHERE: [&str; 12] = [
+const DRAWN_ANYWHERE: [&str; 17] = [
     "least_squares_circle",
     "minimum_zone_circles",
     "minimum_zone_inner",
@@ -176,6 +176,11 @@ const DRAWN_ANYWHERE: [&str; 12] = [
     "moves_arc",
     "surface_of_program",
     "surface_of_blank",
+    "error_as_corrected",
+    "error_as_programmed",
+    "error_of_diameter",
+    "moves_feed",
+    "moves_rapid",
 ];
 
 /// No axis without its true scale: what is drawn stands at a number of the tables, the answer or the job. A profile closes
