@@ -58,7 +58,6 @@ const KNOWN = {
   'digits.js': ['standard_deviation', 'standard_error'],
   'schema.js': ['n_per_mm'],
   'handles.js': ['per_unit'],
-  'process.js': ['interval_95'],
 };
 
 /** Names of fields that jobs and results have, and nothing else that the service says. */
@@ -83,7 +82,7 @@ test('nothing in the page names a field of a job or of a result', () => {
 });
 
 /** What the page reads of a result by one word, where `x-causes` declares that it is there. This list only gets shorter, too. */
-const KNOWN_WORDS = { 'cause.js': ['causes', 'named', 'verdict'] };
+const KNOWN_WORDS = { 'cause.js': ['named'] };
 
 test('nothing in the page reads a field of a job or of a result by one word', () => {
   const own = fieldsOfCalculators();
@@ -105,9 +104,9 @@ test('nothing in the page reads a field of a job or of a result by one word', ()
 });
 
 test('nothing leaves the page past the rule', () => {
-  // What saves, copies or prints stands in one file, or asks it; lists, models, records and processes are no answers.
+  // What saves, copies or prints stands in one file, or asks it.
   for (const [name, text] of files) {
-    if (!['handover.js', 'pages.js', 'library.js', 'process.js'].includes(name))
+    if (name !== 'handover.js')
       assert.ok(!/createObjectURL|api\.file\(|[^a-z]save\(/.test(text), `${name} saves by itself`);
     for (const found of text.matchAll(/window\.print\(\)/g))
       assert.match(text.slice(Math.max(0, found.index - 60), found.index), /owns\(/, `${name} prints unasked`);

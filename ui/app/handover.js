@@ -6,7 +6,7 @@ import * as api from './api.js';
 import { declaredProgram, programText } from './program.js';
 import { originOf } from './text-file.js';
 
-export function save(blob, name) {
+function save(blob, name) {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
   link.download = name;
@@ -35,6 +35,9 @@ export function useHandOver({ name, answer, owns }) {
   };
   return [take, failed.key === answer.key ? failed.why : null];
 }
+
+/** Saves what the service keeps under a name: a model, a record, a process. It is no answer to inputs on the screen. */
+export const saveKept = async (blob, name) => save(await blob, name);
 
 /** Saves a text that was made of the answer with this key. */
 export const saveText = (text, type, name, owns, key) => {

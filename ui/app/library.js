@@ -4,7 +4,7 @@ import { html, useState, useEffect } from './lib.js';
 import { t, typed } from './text.js';
 import * as api from './api.js';
 import { read } from './number.js';
-import { save } from './handover.js';
+import { saveKept } from './handover.js';
 import { FOLDER } from './records.js';
 import { pointer } from './schema.js';
 
@@ -200,6 +200,6 @@ export function Library({ calculators, models }) {
       }
       ${own?.filter(({ id }) => id === opened).map(({ kind, record, id }) => html`<section key=${`${id} ${record.revision}`}><h2>${record.name}</h2>${kind === 'machine' && html`<${Learnt} ...${{ record, calculators, models, done }} fail=${setTrouble} />`}<${Numbers} kind=${kind} record=${record} done=${done} fail=${setTrouble} /></section>`)}
       <p><label class="button">${t('record_import')} <input type="file" class="hidden" accept=".json,.toml,.csv" onChange=${take} /></label>
-        ${Object.keys(TYPES).map(form => html` <button type="button" key=${form} onClick=${() => act(async () => save(await api.exportLibrary(form), `library.${form}`))}>${form.toUpperCase()}<span class="hidden">: ${t('record_export')}</span></button>`)}</p>
+        ${Object.keys(TYPES).map(form => html` <button type="button" key=${form} onClick=${() => act(() => saveKept(api.exportLibrary(form), `library.${form}`))}>${form.toUpperCase()}<span class="hidden">: ${t('record_export')}</span></button>`)}</p>
     </main>`;
 }

@@ -2,7 +2,7 @@
 import { html, useState, useEffect, useRef } from './lib.js';
 import { t, number, duration, moment, language } from './text.js';
 import * as api from './api.js';
-import { save } from './handover.js';
+import { saveKept } from './handover.js';
 import { written } from './address.js';
 import { lastJob } from './mine.js';
 import { useOutcomes, Outcome } from './outcomes.js';
@@ -217,7 +217,7 @@ export function Models({ calculators, models, refreshModels }) {
     if (file) load(file);
   };
   const fetchDocument = async name =>
-    save(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
+    saveKept(new Blob([JSON.stringify(await api.model(name), null, 2)], { type: 'application/json' }), `${name}.json`);
   const load = async file => {
     setTrouble(null);
     try {

@@ -4,7 +4,7 @@ import { html, useState, useEffect, useRef } from './lib.js';
 import { t, capital, number, unitSymbol } from './text.js';
 import * as api from './api.js';
 import { Picture } from './figure.js';
-import { save } from './handover.js';
+import { saveKept } from './handover.js';
 
 const LOOK_MS = 2000;
 const HEIGHT = 300;
@@ -75,7 +75,7 @@ function Process({ name }) {
       await api.decideChange(name, change, decision);
       await look();
     });
-  const take = (query, accept, ending) => attempt(async () => save(await api.processFile(name, query, accept), `${name}.${ending}`));
+  const take = (query, accept, ending) => attempt(() => saveKept(api.processFile(name, query, accept), `${name}.${ending}`));
   return html`
     <main class="plain process" id="main" tabindex="-1"><h1>${name}</h1>
       ${(failed ?? trouble) && html`<p class="problem" role="alert">${failed ?? trouble}</p>`}

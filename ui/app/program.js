@@ -15,6 +15,8 @@ const MOST_ALIKE = 8;
 
 /** What the schema of a result says of the program of its job; `null` where it has none. */
 export function declaredProgram({ output_schema: root }) {
+  // A study answers with what it read off, which no schema describes.
+  if (!root) return null;
   const fields = Object.values(memberOf(root, {})?.properties ?? {}).map(part => resolve(part, root));
   return fields.find(part => part['x-program'])?.['x-program'] ?? null;
 }

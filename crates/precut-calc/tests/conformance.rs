@@ -102,8 +102,11 @@ fn example_runs_and_repeats<C: Calculator>(job: &C::Input, example: &str) -> Vec
     has.extend(in_declared_order(figures.iter().map(|figure| figure.id), C::META.figures, &at));
     let tables = C::tables(job, &first.output);
     let mut numbers = BTreeSet::new();
-    note_numbers(&output, &mut numbers);
-    note_numbers(&filled, &mut numbers);
+    // What a job brings along is drawn as it is written: from the zero of its program, too.
+    for zero in [0.0, filled["program_zero_z_mm"].as_f64().unwrap_or(0.0)] {
+        note_numbers(&output, zero, &mut numbers);
+        note_numbers(&filled, zero, &mut numbers);
+    }
     for column in tables.iter().flat_map(|table| &table.columns) {
         if let Cells::Numbers(cells) = &column.cells {
             numbers.extend(cells.iter().flatten().map(|&number| digits(number)));
@@ -152,18 +155,18 @@ fn digits(number: f64) -> String {
     format!("{:.8e}", if number == 0.0 { 0.0 } else { number })
 }
 
-fn note_numbers(value: &Value, numbers: &mut BTreeSet<String>) {
+fn note_numbers(value: &Value, zero: f64, numbers: &mut BTreeSet<String>) {
     match value {
-        Value::Number(number) => drop(numbers.insert(digits(number.as_f64().unwrap()))),
-        Value::Array(items) => items.iter().for_each(|item| note_numbers(item, numbers)),
-        Value::Object(fields) => fields.values().for_each(|field| note_numbers(field, numbers)),
+        Value::Number(number) => drop(numbers.insert(digits(number.as_f64().unwrap() - zero))),
+        Value::Array(items) => items.iter().for_each(|item| note_numbers(item, zero, numbers)),
+        Value::Object(fields) => fields.values().for_each(|field| note_numbers(field, zero, numbers)),
         _ => {}
     }
 }
 
 /// Curves of a formula, drawn at places of their own: circles about a profile, a fit against what was measured, which is
-/// told by its logarithm; arcs of a program, and a blank by the zero of its program.
-const DRAWN_ANYWHERE: [&str; 17] = [
+/// told by its logarithm; arcs of a program.
+const DRAWN_ANYWHERE: [&str; 11] = [
     "least_squares_circle",
     "minimum_zone_circles",
     "minimum_zone_inner",
@@ -175,12 +178,6 @@ const DRAWN_ANYWHERE: [&str; 17] = [
     "fit_outlier_limit",
     "moves_arc",
     "surface_of_program",
-    "surface_of_blank",
-    "error_as_corrected",
-    "error_as_programmed",
-    "error_of_diameter",
-    "moves_feed",
-    "moves_rapid",
 ];
 
 /// No axis without its true scale: what is drawn stands at a number of the tables, the answer or the job. A profile closes

@@ -96,13 +96,58 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
         |text: &str, example: &str| json!({ "type": ["string", "null"], "description": text, "examples": [example] });
     let some = |text: &str| json!({ "type": ["integer", "null"], "minimum": 0, "description": text, "examples": [39], "x-unit": "1", "x-symbol": "n" });
     let mut add = |name: &str, schema: Value| all.push((name.to_owned(), typed(schema)));
+    let one_of = |text: &str, words: &[&str]| json!({ "type": "string", "enum": words, "description": text, "examples": [words[0]] });
+    let yes = |text: &str| json!({ "type": "boolean", "description": text, "examples": [false] });
+    let two = |text: &str, of: Value| json!({ "type": "array", "minItems": 2, "maxItems": 2, "description": text, "items": of });
+    let size =
+        |text: &str| json!({ "type": "number", "description": text, "examples": [0.0044], "x-unit": "as `unit` says" });
+    add(
+        "ProcessChangedCause",
+        json!({
+            "type": "object", "description": "A cause that may have changed.",
+            "required": ["kind", "share", "form", "parameter", "unit", "delta", "interval_95", "at_bound", "same_as_other"],
+            "properties": {
+                "kind": word("Its kind in the catalogue; `gauge_offset` of the gauge, `unnamed` of what has none.", "tailstock_compliance"),
+                "label": word("Which of several of one kind.", "end"),
+                "share": { "type": "number", "minimum": 0, "maximum": 1, "description": "Probability.", "examples": [0.71], "x-unit": "1" },
+                "form": one_of("How it goes on.", &["step", "drift"]),
+                "parameter": word("The field of the effect that changed.", "compliance_um_per_n"),
+                "unit": word("Its unit.", "um/N"),
+                "delta": size("By how much it changed."),
+                "interval_95": two("The same with 95 %.", size("An end.")),
+                "at_bound": yes("Whether it lies beyond what the cause allows."),
+                "same_as_other": yes("Whether another cause of the list does the same to these parts."),
+            },
+        }),
+    );
+    add(
+        "ProcessChange",
+        json!({
+            "type": "object", "description": "A change of a process.",
+            "required": ["id", "verdict", "reported_at_part", "since_part", "since_parts_90", "accepted", "causes"],
+            "properties": {
+                "id": word("Its name within the process.", "c1"),
+                "verdict": one_of("How sure its name is.", &["named", "one_of", "unnamed"]),
+                "reported_at_part": count("The part after which it was reported.", 39),
+                "since_part": count("The part with which it began, most probably.", 37),
+                "since_parts_90": two("The shortest range of parts in which it began with 90 %.", count("A part.", 36)),
+                "accepted": yes("Whether it is part of the model."),
+                "decided": one_of("What a person said of it; absent where nobody did.", &["confirmed", "rejected", "named"]),
+                "causes": { "type": "array", "description": "Causes that together have 95 %, likeliest first.", "items": reference("ProcessChangedCause") },
+            },
+        }),
+    );
     add(
         "ProcessSaid",
-        open(
-            "What is said of a process after its last part, as docs/physics/process.md says: `state`, `evidence`, `score`, \
+        json!({
+            "type": "object", "additionalProperties": true,
+            "description": "What is said of a process after its last part, as docs/physics/process.md says: `state`, `evidence`, `score`, \
              `change`, `changes`, `odd_parts`, `scatter`, `forecast`, `action`, `measure_next`, `explanation`; after a part also \
              `part`, `number`, `revision`, `replayed_parts` and `news`.",
-        ),
+            "properties": {
+                "changes": { "type": "array", "description": "Every change so far.", "items": reference("ProcessChange") },
+            },
+        }),
     );
     add("ProcessSent", open("What was sent, or what a person decided, or a path that was given out."));
     add(
