@@ -106,8 +106,7 @@ test('nothing in the page reads a field of a job or of a result by one word', ()
 test('nothing leaves the page past the rule', () => {
   // What saves, copies or prints stands in one file, or asks it.
   for (const [name, text] of files) {
-    if (name !== 'handover.js')
-      assert.ok(!/createObjectURL|api\.file\(|[^a-z]save\(/.test(text), `${name} saves by itself`);
+    if (name !== 'handover.js') assert.ok(!/createObjectURL|api\.file\(|[^a-z]save\(/.test(text), `${name} saves by itself`);
     for (const found of text.matchAll(/window\.print\(\)/g))
       assert.match(text.slice(Math.max(0, found.index - 60), found.index), /owns\(/, `${name} prints unasked`);
   }
