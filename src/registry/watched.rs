@@ -120,6 +120,9 @@ struct PartBody<R: ToSchema, W: MeasuredRow + Measurement> {
     /// Readings of a master with the gauge that measured the part.
     #[schema(nullable = false, max_items = 100)]
     gauge_checks: Option<Vec<GaugeCheck>>,
+    /// Whether a person looked at what seemed wrong with it: rows of an earlier part, a wrong unit.
+    #[schema(nullable = false, default = false, example = false)]
+    confirmed: Option<bool>,
     /// What was measured, all in one run.
     #[schema(schema_with = measurements::<W>)]
     measurements: Measured<W>,
@@ -155,8 +158,18 @@ enum PartPathKind {
 pub(crate) trait Watching: Send + Sync {
     /// A part more, of a higher number than all before it and without faults.
     fn take(&mut self, part: Value, monitor: &dyn Monitor) -> Result<State, NotReplayed>;
+    /// What is to be said before a part is taken, because a person should look at it first.
+    fn doubts(&mut self, part: Value, monitor: &dyn Monitor) -> Result<Vec<Finding>, NotReplayed>;
     /// The next part; nothing while the process is learned.
     fn outlook(&mut self, monitor: &dyn Monitor) -> Result<Option<Outlook>, Failure>;
+    /// The job of the next part of a type, with what is known of the process in it; under the conditions of the last part but
+    /// for those given by name. Nothing while the process is learned, and of a type that no part was of.
+    fn next(
+        &mut self,
+        part_type: &str,
+        conditions: &[(String, f64)],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Value>, Failure>;
     /// What a person says of a change, and what is said then; nothing where that does not fit.
     fn decide(&mut self, change: &str, decision: &Decision) -> Option<State>;
     /// The same once more.
@@ -168,8 +181,27 @@ impl<M: Watched> Watching for Watch<M> {
         Ok(Watch::take(self, &read(part, "")?, monitor)?)
     }
 
+    fn doubts(&mut self, part: Value, monitor: &dyn Monitor) -> Result<Vec<Finding>, NotReplayed> {
+        Ok(Watch::doubts(self, &read(part, "")?, monitor)?)
+    }
+
     fn outlook(&mut self, monitor: &dyn Monitor) -> Result<Option<Outlook>, Failure> {
         Watch::outlook(self, monitor)
+    }
+
+    fn next(
+        &mut self,
+        part_type: &str,
+        conditions: &[(String, f64)],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Value>, Failure> {
+        let last = self.last_conditions().map_or_else(M::Run::default, |(_, run)| run.clone());
+        let mut run = json!(last);
+        for (name, value) in conditions {
+            run[name] = json!(value);
+        }
+        let run: M::Run = serde_json::from_value(run).map_err(|error| Failure::Internal(error.to_string()))?;
+        Ok(Watch::next(self, part_type, &run, monitor)?.map(|next| json!(next.job)))
     }
 
     fn decide(&mut self, change: &str, decision: &Decision) -> Option<State> {

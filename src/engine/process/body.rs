@@ -175,8 +175,10 @@ pub(super) fn for_calculator(content: &Value, paths: &[Issued], is_new: bool) ->
         }
         _ => {}
     }
-    if part.get("gauge_checks").is_some_and(Value::is_null) {
-        part.as_object_mut().and_then(|fields| fields.remove("gauge_checks"));
+    for field in ["gauge_checks", "confirmed"] {
+        if part.get(field).is_some_and(Value::is_null) {
+            part.as_object_mut().and_then(|fields| fields.remove(field));
+        }
     }
     Ok(part)
 }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use precut_calc::calculator::Unwatched;
+use precut_calc::calculator::{Finding, Unwatched};
 use precut_calc::process::{Decision, Outlook, State};
 use serde_json::Value;
 use tokio::sync::{Mutex, MutexGuard};
@@ -279,10 +279,7 @@ impl Live {
         for part in coming {
             self.settle(Some(part.number));
             self.last_type = part.value["part_type"].as_str().map(ToOwned::to_owned);
-            let state = self.at.watch.take(part.value, &Unwatched).map_err(|error| match error {
-                NotReplayed::Faults(findings) => body::faulty(findings),
-                NotReplayed::Failed(failure) => Error::Calculation(failure).into(),
-            })?;
+            let state = self.at.watch.take(part.value, &Unwatched).map_err(why)?;
             (self.at.last, self.at.taken) = (part.number, self.at.taken + 1);
             if self.at.taken.is_multiple_of(MARK_EVERY) {
                 self.marks.push(self.at.copy());
@@ -294,6 +291,25 @@ impl Live {
         }
         self.settle(None);
         Ok(())
+    }
+
+    /// What a person should look at before a part is taken that comes last.
+    pub(super) async fn doubts(&self, part: Value) -> Result<Vec<Finding>, ProcessError> {
+        let mut watch = self.at.watch.copy();
+        let computed = tokio::task::spawn_blocking(move || watch.doubts(part, &Unwatched));
+        computed.await.map_err(|error| Error::internal(error.to_string()))?.map_err(why)
+    }
+
+    /// The job of the next part with what is known of the process; nothing while that is nothing.
+    pub(super) async fn known_job(
+        &self,
+        part_type: String,
+        conditions: Vec<(String, f64)>,
+    ) -> Result<Option<Value>, ProcessError> {
+        let mut watch = self.at.watch.copy();
+        let computed = tokio::task::spawn_blocking(move || watch.next(&part_type, &conditions, &Unwatched));
+        let computed = computed.await.map_err(|error| Error::internal(error.to_string()))?;
+        Ok(computed.map_err(Error::Calculation)?)
     }
 
     fn look_ahead(&mut self) -> Result<(), ProcessError> {
@@ -346,13 +362,13 @@ impl Live {
         self.last_type.as_deref()
     }
 
+    pub(super) fn last_said(&self) -> Option<&State> {
+        self.state.as_ref()
+    }
+
     /// What persons decided of a process that has no parts yet.
     pub(super) fn set_decisions(&mut self, decisions: Vec<(u32, String, Decision)>) {
         self.decisions = decisions;
-    }
-
-    pub(super) fn last_said(&self) -> Option<&State> {
-        self.state.as_ref()
     }
 
     /// What was said after each of the parts that were computed last.
@@ -382,4 +398,11 @@ fn issued(entry: &Entry) -> Result<Issued, Error> {
 
 pub(super) fn read(content: &str) -> Result<Value, Error> {
     serde_json::from_str(content).map_err(|error| Error::internal(format!("a kept process: {error}")))
+}
+
+fn why(error: NotReplayed) -> ProcessError {
+    match error {
+        NotReplayed::Faults(findings) => body::faulty(findings),
+        NotReplayed::Failed(failure) => Error::Calculation(failure).into(),
+    }
 }

@@ -3,17 +3,14 @@
 use std::sync::Arc;
 
 use precut_calc::calculator::Finding;
-use precut_calc::process::{ActionKind, ChangeForm, ChangeVerdict, Decided, State};
-use serde_json::{Map, Value, json};
+use precut_calc::process::ActionKind;
+use serde_json::{Value, json};
 
+use super::body::Issued;
 use super::live::Live;
 use super::{ProcessError, TRIES};
 use crate::engine::{Body, Engine, Error, Shelf, Solved};
-use crate::registry::{Entry, Faults};
 use crate::store::processes::{Addition, EntryKind, NewEntry};
-
-/// A drift is as large as is told after so many parts.
-const DRIFT_PARTS: f64 = 20.0;
 
 /// On which path the next part is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,10 +95,7 @@ impl Engine {
             if asked.issue && (calls || live.document.is_stopped()) && asked.path != Some(WhichPath::AsNow) {
                 return Err(ProcessError::CallPerson);
             }
-            let mut job = live.job(&entry, &part_type, path);
-            for (name, value) in &asked.conditions {
-                job["conditions"][name] = json!(value);
-            }
+            let job = live.job(&part_type, path, asked.conditions.clone()).await?;
             let calculator = entry.meta().id;
             let solved = self.solve(calculator, Body::Json(job.to_string().into())).await?;
             let key = solved.stored.key.to_string();
@@ -179,51 +173,31 @@ impl Live {
         Err(ProcessError::one(finding.with("known", known)))
     }
 
-    /// The job of a part: the one that was given out last, or that of the model as it is by now.
-    fn job(&self, entry: &Entry, part_type: &str, path: WhichPath) -> Value {
-        let base = self.document.filled["part_types"][part_type]["job"].clone();
+    /// The job of a part: the one that was given out last, or that of the model as it is by now. It is the base job's where
+    /// nothing was given out, and while nothing is known.
+    async fn job(
+        &self,
+        part_type: &str,
+        path: WhichPath,
+        conditions: Vec<(String, f64)>,
+    ) -> Result<Value, ProcessError> {
+        let mut job = self.document.filled["part_types"][part_type]["job"].clone();
         match path {
             WhichPath::AsNow => {
-                let issued = self.paths.iter().rev().find(|issued| issued.content["part_type"] == part_type);
-                issued.map_or(base, |issued| issued.content["job"].clone())
+                let is_it = |issued: &&Issued| issued.content["part_type"] == part_type;
+                if let Some(issued) = self.paths.iter().rev().find(is_it) {
+                    job = issued.content["job"].clone();
+                }
             }
-            WhichPath::NewPath => match self.last_said() {
-                Some(state) => with_changes(entry, base, state),
-                None => base,
-            },
+            WhichPath::NewPath => {
+                if let Some(known) = self.known_job(part_type.to_owned(), conditions.clone()).await? {
+                    job = known;
+                }
+            }
         }
+        for (name, value) in &conditions {
+            job["conditions"][name] = json!(value);
+        }
+        Ok(job)
     }
-}
-
-/// A job with what has changed: of each change its leading cause. What is no effect of a job stays out: the gauge, and
-/// what has no name.
-fn with_changes(entry: &Entry, mut job: Value, state: &State) -> Value {
-    let mut effects: Vec<Value> = job["effects"].as_array().cloned().unwrap_or_default();
-    for change in &state.changes {
-        let Some(cause) = change.causes.first() else { continue };
-        let acts = match cause.form {
-            ChangeForm::Step => 1.0,
-            ChangeForm::Drift => f64::from(state.number + 2 - change.since_part.min(state.number + 1)) / DRIFT_PARTS,
-        };
-        let is_named = change.verdict != ChangeVerdict::Unnamed || change.decided == Some(Decided::Named);
-        if !is_named || change.decided == Some(Decided::Rejected) || !cause.label.is_empty() {
-            continue;
-        }
-        let mut with = effects.clone();
-        if let Some(effect) = with.iter_mut().find(|effect| effect["kind"] == cause.kind.as_str()) {
-            let held = effect[cause.parameter].as_f64().unwrap_or(0.0);
-            effect[cause.parameter] = json!(held + acts * cause.delta);
-        } else {
-            let size = (cause.parameter.to_owned(), json!(acts * cause.delta));
-            let effect: Map<String, Value> = [("kind".to_owned(), json!(cause.kind)), size].into_iter().collect();
-            with.push(effect.into());
-        }
-        let mut faults = Faults::default();
-        entry.validate_effects(&json!(with), &mut faults);
-        if faults.total == 0 {
-            effects = with;
-        }
-    }
-    job["effects"] = json!(effects);
-    job
 }

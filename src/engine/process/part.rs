@@ -335,6 +335,12 @@ impl Inner {
         let (comes, text) = change.comes.unzip();
         let number = comes.as_ref().map(|coming| coming.number);
         let first = had.into_iter().chain(number).min().unwrap_or(0);
+        if let Some(coming) = comes.as_ref().filter(|_| first > live.last()) {
+            let doubts = live.doubts(coming.value.clone()).await?;
+            if !doubts.is_empty() {
+                return Err(faulty(doubts));
+            }
+        }
         let (back, from) = if first > live.last() { (live.copy(), 0) } else { live.before(self, first)? };
         let later = if from > 0 { Live::parts(self, full, from).await? } else { Vec::new() };
         let (mut all, mut replayed) = (Vec::new(), 0);
