@@ -15,8 +15,8 @@ pub(crate) fn replay(registry: &Registry, bytes: &[u8], monitor: &dyn Monitor) -
     let Some(calculator) = process.get("calculator").and_then(Value::as_str).map(ToOwned::to_owned) else {
         return Err(invalid(vec![Finding::new("process_without_calculator", "/calculator")]));
     };
-    let entry = super::entry(registry, &calculator)?;
-    let Some(observed) = entry.observed() else { return Err(invalid(vec![not_watched(registry, &calculator)])) };
+    let observed = registry.entry(&calculator).and_then(|entry| entry.observed());
+    let Some(observed) = observed else { return Err(invalid(vec![not_watched(registry, &calculator)])) };
     fill_jobs(registry, &calculator, &mut process)?;
     let parts = process.get_mut("parts").and_then(Value::as_array_mut);
     parts.into_iter().flatten().for_each(lift);

@@ -204,9 +204,12 @@ fn offered(calculator: &str, declared: &Value) -> Map<String, Value> {
                 "type": "string", "maxLength": 100, "description": "`name`, or `name@revision`.", "examples": [named.example],
             });
             let object = json!({ "$ref": format!("#/components/schemas/{}", named.component) });
-            let own = declared["properties"].get(name).cloned();
-            let forms: Vec<Value> = [Some(word), own, Some(object)].into_iter().flatten().collect();
-            (name.to_owned(), json!({ "oneOf": forms, "description": named.about }))
+            let field = match declared["properties"].get(name) {
+                // What a job states there itself is an object, too, so more than one of the forms can fit.
+                Some(own) => json!({ "anyOf": [word, own, object], "description": named.about }),
+                None => json!({ "oneOf": [word, object], "description": named.about }),
+            };
+            (name.to_owned(), field)
         })
         .collect()
 }

@@ -70,8 +70,8 @@ impl Engine {
         let Some(calculator) = named else {
             return Err(ProcessError::one(Finding::new("process_without_calculator", "/calculator")));
         };
-        let entry = inner.known(&calculator)?;
-        let Some(observed) = entry.observed() else {
+        let entry = inner.registry.entry(&calculator).cloned();
+        let Some((entry, observed)) = entry.as_ref().and_then(|entry| entry.observed().map(|own| (entry, own))) else {
             return Err(ProcessError::one(not_watched(&inner.registry, &calculator)));
         };
         let mut filled = sent.clone();
@@ -105,7 +105,7 @@ impl Engine {
             if let (Some(model), None) = (&model, job.get("model")) {
                 job["model"] = model.clone();
             }
-            match inner.read(&entry, Body::Json(job.to_string().into()), shelf).await {
+            match inner.read(entry, Body::Json(job.to_string().into()), shelf).await {
                 Ok(ready) => *job = ready.prepared.input().map_err(Error::Calculation)?,
                 Err(Error::Invalid { findings, .. }) => {
                     found.extend(findings.into_iter().map(|finding| finding.under(&pointer)));

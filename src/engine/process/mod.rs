@@ -214,19 +214,27 @@ impl Engine {
         }
         let seat = self.inner.live_processes.seat(&shelf.full(name));
         let mut live = seat.lock().await;
+        let mut read_as: Option<Document> = None;
         for _ in 0..TRIES {
             let there = match self.process(shelf, name).await {
                 Ok(there) => Some(there),
                 Err(ProcessError::Unknown { .. }) => None,
                 Err(error) => return Err(error),
             };
+            if let Some(there) = &there
+                && canonical_text(&there.document)? == canonical_text(&sent)?
+            {
+                return Ok((there.clone(), false));
+            }
+            // What is wrong by itself is told before what has changed meanwhile.
+            let document = match read_as.take() {
+                Some(document) => document,
+                None => self.read_document(shelf, sent.clone()).await?,
+            };
+            read_as = Some(document.clone());
             if let Some(there) = &there {
-                if canonical_text(&there.document)? == canonical_text(&sent)? {
-                    return Ok((there.clone(), false));
-                }
                 precondition.hold(&there.tag())?;
             }
-            let document = self.read_document(shelf, sent.clone()).await?;
             let made = self.declared(shelf, name, document, there.as_ref(), &owner).await?;
             *live = None;
             if made {

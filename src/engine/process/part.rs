@@ -89,15 +89,16 @@ impl Engine {
             let content = read_as.clone().unwrap_or_default();
             let text = canonical_text(&content)?;
             let there = inner.processes.process_part(full.clone(), part.to_owned()).await?;
-            if let Some(there) = there.as_ref().filter(|there| there.number.is_some()) {
-                if there.content == text {
-                    let said = read(&there.said)?;
-                    return Ok(PartAnswer { outcome: PartOutcome::Same, revision: there.revision, said });
-                }
-                precondition.hold(&there.revision.to_string())?;
+            let standing = there.as_ref().filter(|there| there.number.is_some());
+            if let Some(same) = standing.filter(|there| there.content == text) {
+                let said = read(&same.said)?;
+                return Ok(PartAnswer { outcome: PartOutcome::Same, revision: same.revision, said });
             }
             let number = number_of(&content)?;
             let value = for_calculator(&content, &live.paths, there.is_none()).map_err(ProcessError::one)?;
+            if let Some(standing) = standing {
+                precondition.hold(&standing.revision.to_string())?;
+            }
             inner.between_neighbours(live, &full, (part, number), &value).await?;
             too_many_parts(live.count() + 1).map_or(Ok(()), Err)?;
             let change = Change {

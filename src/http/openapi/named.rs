@@ -46,7 +46,7 @@ impl Names<'_> {
                     .collect::<Map<_, _>>()
                     .into(),
                 ("items", part) => self.named(part, &format!("{name}Item"), into),
-                ("oneOf", Value::Array(variants)) => {
+                ("oneOf" | "anyOf", Value::Array(variants)) => {
                     let tag = self.tag(variants);
                     let variants: Vec<Value> =
                         variants.iter().map(|variant| self.variant(variant, tag.as_deref(), name, into)).collect();

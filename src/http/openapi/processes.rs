@@ -149,6 +149,10 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
             },
         }),
     );
+    add(
+        "ProcessState",
+        json!({ "description": "What was said last; null before the first part.", "oneOf": [{ "type": "null" }, reference("ProcessSaid")] }),
+    );
     add("ProcessSent", open("What was sent, or what a person decided, or a path that was given out."));
     add(
         "Process",
@@ -159,7 +163,7 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
                 "name": word("Its name.", EXAMPLE), "revision": count("Of its document.", 1),
                 "sequence": count("Number of the last entry of its record.", 41), "created_at": time,
                 "document": reference("ProcessSent"),
-                "state": { "description": "What was said last; null before the first part.", "oneOf": [{ "type": "null" }, reference("ProcessSaid")] },
+                "state": reference("ProcessState"),
                 "links": open("Where to go from here."),
             },
         }),
@@ -220,7 +224,7 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
             "properties": {
                 "taken": count("Parts that are new.", 36), "replayed_parts": count("Parts that were judged anew.", 0),
                 "said": { "type": "array", "description": "A line for each part.", "items": open("What is said after it: `part`, `number`, `state`, `evidence`, `score`, `change`, `unused`.") },
-                "state": reference("ProcessSaid"),
+                "state": reference("ProcessState"),
             },
         }),
     );
@@ -329,7 +333,7 @@ fn changed(about: &str, schema: &str) -> ResponseBuilder {
 }
 
 fn number() -> Object {
-    parts::integer(0, 1_000_000_000, 0)
+    parts::integer(0, processes::MOST_NUMBER, 0)
 }
 
 fn body(about: &str, schema: &str, example: Option<Value>) -> RequestBody {
@@ -500,7 +504,7 @@ fn state() -> OperationBuilder {
     .parameter(query("figure", "As SVG: which figure.", parts::one_of(["chart", "next"].map(ToOwned::to_owned))))
     .response(
         "200",
-        parts::tagged(document("What is said.", "ProcessSaid"))
+        parts::tagged(document("What is said.", "ProcessState"))
             .content("text/csv", parts::text_of("One of its tables."))
             .content("image/svg+xml", parts::text_of("One of its figures.")),
     );

@@ -28,6 +28,8 @@ use crate::text::Language;
 
 /// Most processes, parts or entries of one page.
 pub(super) const MOST_ITEMS: u32 = 500;
+/// Largest number of a part or an entry that can be asked for.
+pub(super) const MOST_NUMBER: u32 = 1_000_000_000;
 /// As many on a page unless asked for more or fewer.
 pub(super) const DEFAULT_ITEMS: u32 = 50;
 

@@ -13,7 +13,7 @@ use super::super::auth::Caller;
 use super::super::problem::Problem;
 use super::super::query::Query;
 use super::super::{App, body, gate, negotiate};
-use super::{DEFAULT_ITEMS, MOST_ITEMS, answered, located, precondition, tagged, time};
+use super::{DEFAULT_ITEMS, MOST_ITEMS, MOST_NUMBER, answered, located, precondition, tagged, time};
 use crate::engine::{Body, PartAnswer, PartOutcome, ProcessError, in_language, parsed};
 use crate::store::processes::{Entry, KeptPart};
 use crate::text::Language;
@@ -69,7 +69,7 @@ pub(super) async fn list(
 ) -> Result<Response, Problem> {
     const STATES: &[&str] = &["learning", "in_control", "warning", "changed"];
     let mut query = Query::of(&uri, &["from", "to", "state", "limit"])?;
-    let numbers = &(0..=u32::MAX);
+    let numbers = &(0..=MOST_NUMBER);
     let (from, to) = (query.number("from", numbers)?.unwrap_or(0), query.number("to", numbers)?);
     let state = query.one_of("state", STATES, |state| state)?;
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
@@ -100,9 +100,9 @@ pub(super) async fn history(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["after", "limit"])?;
-    let after = query.number("after", &(0..=i64::MAX))?.unwrap_or(0);
+    let after = query.number("after", &(0..=MOST_NUMBER))?.unwrap_or(0);
     let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
-    let mut entries = app.engine.process_entries(&caller.shelf(), &name, after, limit + 1).await?;
+    let mut entries = app.engine.process_entries(&caller.shelf(), &name, after.into(), limit + 1).await?;
     let more = entries.len() > limit as usize;
     entries.truncate(limit as usize);
     let next = entries.last().filter(|_| more);

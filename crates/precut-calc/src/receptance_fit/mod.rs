@@ -133,6 +133,7 @@ fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     let mut found = Outcome {
         modes: Vec::new(),
         certainty: Vec::new(),
+        largest_residual_share: 0.0,
         groups: Vec::new(),
         functions: functions.iter().map(unfitted).collect(),
         curve: Vec::new(),
@@ -228,6 +229,7 @@ fn add(found: &mut Outcome, group: &Group, chosen: &Chosen) {
         let count = lines.values.len();
         function.lines = count;
         function.residual_share = left.share(0, count);
+        found.largest_residual_share = found.largest_residual_share.max(function.residual_share);
         function.neighbour_correlation = left.neighbour_correlation();
         let parts = PARTS.min(count / LEAST_LINES).max(1);
         function.bands = (0..parts)

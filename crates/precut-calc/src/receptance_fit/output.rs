@@ -13,6 +13,9 @@ pub struct Outcome {
     pub modes: Vec<FittedMode>,
     /// How well each is known, in the same order.
     pub certainty: Vec<ModeCertainty>,
+    /// Largest share that the modes leave of a function.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub largest_residual_share: f64,
     /// Directions that were fitted together, and how many modes they ask for.
     pub groups: Vec<FittedGroup>,
     /// How well each function is met.
