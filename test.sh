@@ -179,6 +179,7 @@ run_tests() {
     name=${name%.rs}
     [ "$name" = browser ] || others+=(--test "$name")
   done
+  others+=(--test library)
   cargo test --workspace --locked --no-run
   # The calculators' own tests only compute: they get what the others leave of the cores, which wait for processes and
   # pages. The pages of a browser leave nothing to those that wait for a process, so they come after them.

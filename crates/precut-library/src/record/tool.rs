@@ -46,7 +46,7 @@ const BAR: &[Field] = &[
 ];
 
 const RECOMMENDED: &[Field] = &[
-    needed("cut", Form::Word(&["finish", "medium", "rough"]), "Kind of the cut."),
+    needed("cut", Form::Word(&["finish", "medium", "rough", "small_parts"]), "Kind of the cut."),
     needed("iso513_group", Form::Word(GROUPS), "Group of the material."),
     field("depth_low_mm", Form::Plain(quantity("mm", "t", (0.0001, 1000.0), 0.5)), "Least depth of cut."),
     field("depth_high_mm", Form::Plain(quantity("mm", "t", (0.0001, 1000.0), 4.0)), "Largest depth of cut."),

@@ -11,7 +11,8 @@ use crate::kienzle::{self, Choice, JUDGED_FORCE_PERCENT, Row, Sources};
 
 /// Elastic constants of the shaft, then the force.
 pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
-    let has_work = room != Room::Program || writer.at("/stock").is_some();
+    // A schedule of stated compliances has no shaft, and a program that is only read no blank.
+    let has_work = room == Room::Deflection || writer.at(&format!("/{}", room.work())).is_some();
     if let Some(material) = views.material_of_shaft().filter(|_| has_work) {
         elastic(room, material, writer);
     }
