@@ -1,5 +1,7 @@
 //! The page of a process under watch: the tailstock that softened.
 
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 
 use crate::both;
@@ -21,6 +23,51 @@ fn feed(page: &mut Page, count: usize) {
     ] {
         assert_eq!(page.evaluate(&format!("{send}({}, {}, {body})", json!(method), json!(path))), "ok", "{path}");
     }
+}
+
+/// The first parts of the stream as a table.
+fn history(count: usize) -> String {
+    let process = process_file("r01-tailstock-softer.json");
+    let mut table =
+        "part,number,part_type,edge,batch,tool_path_at_start_m,warm_time_at_start_min,z_mm,diameter_deviation_um\n"
+            .to_owned();
+    for part in &process["parts"].as_array().unwrap()[..count] {
+        let (number, c) = (&part["number"], &part["conditions"]);
+        for row in part["measurements"].as_array().unwrap() {
+            let cells = [
+                &c["edge"],
+                &c["batch"],
+                &c["tool_path_at_start_m"],
+                &c["warm_time_at_start_min"],
+                &row["z_mm"],
+                &row["diameter_deviation_um"],
+            ];
+            let cells = cells.map(|cell| cell.to_string().replace('"', "")).join(",");
+            let _ = writeln!(table, "p-{number},{number},{},{cells}", part["part_type"].as_str().unwrap());
+        }
+    }
+    table
+}
+
+#[test]
+fn a_history_from_a_file_tells_what_would_have_been_said_when() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    page.open(&service.page("processes"));
+    page.wait_for(".empty-list");
+    feed(&mut page, 0);
+    page.open(&service.page("processes?name=shaft-560"));
+    page.wait_for(".process-history input[type=file]");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("history.csv");
+    std::fs::write(&file, history(42)).unwrap();
+    page.choose_file(".process-history input[type=file]", &file);
+    page.wait_for(".process-history [role=status]");
+    let told = page.text(".process-history");
+    assert!(told.contains("42 parts taken"), "{told}");
+    assert!(told.contains("a change is known"), "{told}");
+    page.until("document.querySelector('.process-say').dataset.state === 'changed'");
+    crate::access::assert_accessible(&mut page, "a process with a history");
+    page.assert_calm();
 }
 
 #[test]

@@ -331,6 +331,47 @@ async fn the_next_part_has_the_calculators_own_job_and_program() {
 }
 
 #[tokio::test]
+async fn what_a_new_path_brought_is_told_drawn_and_given_as_a_table() {
+    let server = server().await;
+    with_parts(&server, 46).await;
+    let figures = |list: Value| -> Vec<String> {
+        list["items"].as_array().unwrap().iter().map(|figure| figure["id"].as_str().unwrap().to_owned()).collect()
+    };
+    let before = figures(got(&server, "/v1/processes/shaft-560/figures").await);
+    assert_eq!(before, ["chart", "next"], "of a history that came at once nobody was told the account part by part");
+    let program = server.get("/v1/processes/shaft-560/next?path=new_path").header("accept", "text/x-gcode");
+    assert_eq!(header(&program.send().await.unwrap(), "precut-path"), "1");
+    let state = got(&server, "/v1/processes/shaft-560/state").await;
+    // A part that comes out as it is expected on the new path.
+    let mut better = part(47);
+    better["path"] = json!({ "kind": "process", "revision": 1 });
+    let expected = state["forecast"]["new_path"]["mean"].as_array().unwrap();
+    for (row, mean) in better["measurements"].as_array_mut().unwrap().iter_mut().zip(expected) {
+        row["diameter_deviation_um"] = json!((10.0 * mean.as_f64().unwrap()).round() / 10.0);
+    }
+    assert_eq!(put(&server, "/v1/processes/shaft-560/parts/p-47", &better).await.status(), 201);
+    let gain = got(&server, "/v1/processes/shaft-560/gain").await["gain"].take();
+    // Those of the stream are cut on the nominal path, which is not that of the job either.
+    assert_eq!(gain["parts_cut_with_new_path"], 47);
+    let gained = gain["form_gain_um"].as_f64().unwrap();
+    assert!(gained > state["gain"]["form_gain_um"].as_f64().unwrap(), "{gain}");
+    assert_eq!(figures(got(&server, "/v1/processes/shaft-560/figures").await), ["chart", "gain", "next"]);
+    let table = async |name: &str| {
+        let asked = server.get(&format!("/v1/processes/shaft-560/state?table={name}")).header("accept", "text/csv");
+        asked.send().await.unwrap().text().await.unwrap()
+    };
+    let of_gain = table("gain").await;
+    let last: Vec<&str> = of_gain.lines().last().unwrap().split(',').collect();
+    assert_eq!((last[0], last[1], last[3]), ("47", "p-47", "47"));
+    assert!((last[4].parse::<f64>().unwrap() - gained).abs() < 1e-9);
+    let of_model = table("model").await;
+    assert!(of_model.lines().any(|line| line.starts_with("tailstock_compliance,")), "{of_model}");
+    let drawn = server.get("/v1/processes/shaft-560/state?figure=gain").header("accept", "image/svg+xml");
+    assert!(drawn.send().await.unwrap().text().await.unwrap().starts_with("<svg"));
+    server.stop().await;
+}
+
+#[tokio::test]
 async fn every_fault_of_a_process_or_a_part_is_told_at_once() {
     let server = server().await;
     let mut process = declared();
@@ -340,10 +381,12 @@ async fn every_fault_of_a_process_or_a_part_is_told_at_once() {
     let told = problem(put(&server, "/v1/processes/shaft-560", &process).await, 422, "invalid_process").await;
     let places: Vec<&str> = told["errors"].as_array().unwrap().iter().map(|e| e["pointer"].as_str().unwrap()).collect();
     assert_eq!(places, ["/options/learning_parts", "/optoins", "/part_types/A/job/cut/feed_mm_per_rev"], "{told}");
-    let mut ring = declared();
-    ring["calculator"] = json!("ring-clamping");
-    let told = problem(put(&server, "/v1/processes/shaft-560", &ring).await, 422, "invalid_process").await;
-    assert_eq!(told["errors"][0]["code"], "calculator_not_watched");
+    for name in ["ring-clamping", "shaft-compensation"] {
+        let mut other = declared();
+        other["calculator"] = json!(name);
+        let told = problem(put(&server, "/v1/processes/shaft-560", &other).await, 422, "invalid_process").await;
+        assert_eq!(told["errors"][0]["code"], "calculator_not_watched", "{name}");
+    }
     problem(put(&server, "/v1/processes/Shaft", &declared()).await, 422, "invalid_process").await;
     problem(put(&server, "/v1/processes/none/parts/a", &part(1)).await, 404, "unknown_process").await;
     assert_eq!(put(&server, "/v1/processes/shaft-560", &declared()).await.status(), 201);

@@ -200,6 +200,9 @@ export const process = name => json(processAt(name));
 export const processFigures = async name => (await json(`${processAt(name)}/figures`)).items;
 /** Something that a process gives out, as a file. */
 export const processFile = async (name, rest, accept) => (await ask(processAt(name) + rest, { headers: { Accept: accept } })).blob();
+/** A whole history as CSV: what would have been said when. */
+export const putHistory = (name, text) =>
+  json(`${processAt(name)}/parts`, { method: 'POST', headers: { 'Content-Type': 'text/csv' }, body: text });
 export const decideChange = (name, change, decision) =>
   json(`${processAt(name)}/changes/${enc(change)}`, {
     method: 'POST',

@@ -84,9 +84,12 @@ function Process({ name }) {
         figure => html`<section key=${figure.id} class="picture-box" aria-label=${figure.title.text}><h2>${figure.title.text}</h2><${Picture} figure=${figure} height=${HEIGHT} />
         <p><button type="button" onClick=${() => take(`/state?figure=${figure.id}`, 'image/svg+xml', 'svg')}>SVG<span class="hidden"> ${figure.title.text}</span></button></p></section>`,
       )}
+      ${state?.gain?.parts_cut_with_new_path > 0 && html`<${Gain} ...${state.gain} />`}
       ${state?.changes.length > 0 && html`<${Changes} changes=${state.changes} decide=${decide} />`}
+      ${state?.model?.sizes.length > 0 && html`<${Model} sizes=${state.model.sizes} />`}
       ${state?.measure_next?.length > 0 && html`<${Measure} list=${state.measure_next} />`}
       ${state && html`<p><button type="button" onClick=${() => take('/state?table=parts', 'text/csv', 'csv')}>${t('process_parts_csv')}</button></p>`}
+      ${process && html`<${History} ...${{ name, attempt, look }} />`}
       <p><a href="#/processes">${t('processes')}</a></p>
     </main>`;
 }
@@ -110,10 +113,48 @@ function Say({ name, state, attempt, take }) {
 }
 
 const SIZE_DIGITS = 3;
+const size = cause =>
+  `${number(cause.delta, SIZE_DIGITS)} (${number(cause.interval_95[0], SIZE_DIGITS)} … ${number(cause.interval_95[1], SIZE_DIGITS)}) ${unitSymbol(cause.unit)}`;
+
+/** What paths brought so far. */
+function Gain(gain) {
+  const [lower, upper] = gain.form_gain_interval_95;
+  return html`
+    <section class="process-gain"><h2>${t('process_gain')}</h2>
+      <p>${t('process_gained', { form: number(gain.form_gain_um, SIZE_DIGITS), lower: number(lower, SIZE_DIGITS), upper: number(upper, SIZE_DIGITS), parts: number(gain.parts), other: number(gain.parts_cut_with_new_path) })}</p>
+      <p>${t('process_saved', { saved: number(gain.parts_saved, 2), spoilt: number(gain.parts_spoilt, 2) })}</p>
+    </section>`;
+}
+
+/** By what the process differs from its job now. */
+function Model({ sizes }) {
+  return html`
+    <section class="process-model"><h2>${t('process_model')}</h2>
+      <ul>${sizes.map(
+        own =>
+          html`<li key=${own.kind + own.label + own.since_part + own.parameter}>${capital(own.text)} ${own.label} <span class="number">${size(own)}</span>${own.since_part ? html` <span class="quiet">${t('process_model_since', { since: number(own.since_part) })}</span>` : ''}</li>`,
+      )}</ul>
+    </section>`;
+}
+
+/** Parts that were measured before anyone watched: what would have been said when. */
+function History({ name, attempt, look }) {
+  const [told, setTold] = useState(null);
+  const read = file =>
+    attempt(async () => {
+      setTold(await api.putHistory(name, await file.text()));
+      await look();
+    });
+  const lines = told?.said.filter(({ state, unused }) => unused || state === 'warning' || state === 'changed');
+  return html`
+    <section class="process-history"><h2>${t('process_history')}</h2><p class="quiet">${t('process_history_about')}</p>
+      <p><label>${t('process_history_file')} <input type="file" accept=".csv,text/csv" onChange=${event => event.target.files[0] && read(event.target.files[0])} /></label></p>
+      ${told && html`<p role="status">${t('process_history_taken', { taken: number(told.taken), told: number(lines.length) })}</p>`}
+      ${lines?.length > 0 && html`<ol>${lines.map(line => html`<li key=${line.part}>${t(`process_history_${line.unused ? 'unused' : line.state}`, { number: number(line.number), part: line.part })}</li>`)}</ol>`}
+    </section>`;
+}
 
 function Changes({ changes, decide }) {
-  const size = cause =>
-    `${number(cause.delta, SIZE_DIGITS)} (${number(cause.interval_95[0], SIZE_DIGITS)} … ${number(cause.interval_95[1], SIZE_DIGITS)}) ${unitSymbol(cause.unit)}`;
   return html`
     <section class="process-changes"><h2>${t('process_changes')}</h2>
       ${[...changes].reverse().map(

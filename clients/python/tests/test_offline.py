@@ -27,7 +27,7 @@ def test_a_model_refuses_what_a_field_alone_shows():
 
 def test_only_what_was_said_is_sent():
     support = models.SupportCentre(z_mm=0, tangential_compliance_um_per_n=None)
-    assert support.sent() == {"kind": "centre", "z_mm": 0.0}
+    assert support.as_sent() == {"kind": "centre", "z_mm": 0.0}
 
 
 def test_a_job_says_its_calculator():

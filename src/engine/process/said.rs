@@ -71,19 +71,20 @@ pub(super) fn news(before: Option<&State>, now: &State, replayed: usize) -> Vec<
     news
 }
 
-/// What the causes of a change are called.
-fn name_causes(change: Option<&mut Value>, language: Language) {
-    let causes = change.and_then(|change| change.get_mut("causes")).and_then(Value::as_array_mut);
-    for cause in causes.into_iter().flatten() {
+/// What the causes of a change or of a model are called.
+fn name_causes(causes: Option<&mut Value>, language: Language) {
+    for cause in causes.and_then(Value::as_array_mut).into_iter().flatten() {
         cause["text"] = json!(cause["kind"].as_str().map(|kind| Glossary::of(language).name(kind)));
     }
 }
 
 /// What was said, in that language.
 pub(crate) fn in_language(mut said: Value, language: Language) -> Value {
-    name_causes(said.get_mut("change"), language);
+    for place in ["/change/causes", "/model/sizes"] {
+        name_causes(said.pointer_mut(place), language);
+    }
     let changes = said.get_mut("changes").and_then(Value::as_array_mut);
-    changes.into_iter().flatten().for_each(|change| name_causes(Some(change), language));
+    changes.into_iter().flatten().for_each(|change| name_causes(change.get_mut("causes"), language));
     if language == Language::default() {
         return said;
     }

@@ -493,15 +493,15 @@ fn withdraw() -> OperationBuilder {
 }
 
 fn state() -> OperationBuilder {
-    let tables = ["parts", "changes"].map(ToOwned::to_owned);
+    let tables = processes::TABLES.iter().map(|&table| table.to_owned());
     let operation = operation(
         "read_process_state",
         "What is said of a process?",
-        "What was said last; as CSV a line for each part or change.",
+        "What was said last; as CSV a line for each part, change, cause of the model, or part with what paths brought by then.",
     )
     .parameter(name())
     .parameter(query("table", "As CSV: which table.", parts::one_of(tables)))
-    .parameter(query("figure", "As SVG: which figure.", parts::one_of(["chart", "next"].map(ToOwned::to_owned))))
+    .parameter(query("figure", "As SVG: which figure.", parts::one_of(processes::FIGURES.iter().map(|&figure| figure.to_owned()))))
     .response(
         "200",
         parts::tagged(document("What is said.", "ProcessState"))
@@ -515,7 +515,7 @@ fn figures() -> OperationBuilder {
     let operation = operation(
         "read_process_figures",
         "What does a process look like?",
-        "Its control chart, and what is expected of the next part, as data that a page draws.",
+        "Its control chart, what its paths brought, and what is expected of the next part, as data that a page draws.",
     )
     .parameter(name())
     .parameter(language())
@@ -573,7 +573,11 @@ fn next(registry: &Registry) -> OperationBuilder {
     .parameter(language());
     let observed = registry.entries().iter().filter_map(|entry| entry.observed());
     for condition in observed.flat_map(|observed| observed.conditions) {
-        let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::Number)).minimum(Some(0.0)).build();
+        let schema = ObjectBuilder::new()
+            .schema_type(SchemaType::new(Type::Number))
+            .minimum(Some(0.0))
+            .maximum(Some(processes::MOST_NUMBER))
+            .build();
         operation = operation.parameter(query(condition, "The same of the next part.", schema));
     }
     let operation = operation.response(

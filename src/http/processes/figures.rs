@@ -1,10 +1,11 @@
-//! Pictures of a process: the control chart, and what is expected of the next part.
+//! Pictures of a process: the control chart, what its paths brought, and what is expected of the next part.
 
 use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::HeaderMap;
 use axum::response::Response;
 use precut_calc::calculator::{Axis, Figure, Frame, Item, Message, Panel, Role};
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::super::App;
@@ -17,7 +18,7 @@ use crate::engine::{KeptProcess, Shelf};
 use crate::store::processes::KeptPart;
 
 /// Their names.
-pub(super) const FIGURES: &[&str] = &["chart", "next"];
+pub(in crate::http) const FIGURES: &[&str] = &["chart", "gain", "next"];
 /// Parts that are read at once.
 const PAGE: u32 = 1000;
 /// A chart shows no more of the last parts.
@@ -52,7 +53,71 @@ pub(super) async fn all(app: &App, shelf: &Shelf, process: &KeptProcess) -> Resu
     }
     let state = process.state.clone().unwrap_or_default();
     let next = parts.last().and_then(|last| next(&state, last, &process.document));
-    Ok([chart(&state, &parts)].into_iter().chain(next).collect())
+    Ok([chart(&state, &parts)].into_iter().chain(gain(&parts)).chain(next).collect())
+}
+
+/// What was said after a part, as far as the account goes.
+#[derive(Debug, Default, Deserialize)]
+pub(super) struct Said {
+    pub(super) gain: Option<Gained>,
+}
+
+/// The account after a part.
+#[derive(Debug, Deserialize)]
+pub(super) struct Gained {
+    pub(super) parts: u32,
+    pub(super) parts_cut_with_new_path: u32,
+    pub(super) form_gain_um: f64,
+    pub(super) form_gain_interval_95: [f64; 2],
+    pub(super) parts_saved: f64,
+    pub(super) parts_saved_interval_95: [f64; 2],
+    pub(super) parts_spoilt: f64,
+    pub(super) parts_spoilt_interval_95: [f64; 2],
+}
+
+impl Said {
+    pub(super) fn after(part: &KeptPart) -> Self {
+        serde_json::from_str(&part.said).unwrap_or_default()
+    }
+}
+
+/// What paths brought, as it was told after each part; nothing where all parts were cut on the path of the base job.
+fn gain(parts: &[KeptPart]) -> Option<Figure> {
+    let told = parts.iter().filter_map(|part| Some((number_of(part), Said::after(part).gain?)));
+    let (x, told): (Vec<f64>, Vec<Gained>) = told.unzip();
+    told.last().filter(|last| last.parts_cut_with_new_path > 0)?;
+    let panel = |axis, items| Panel { y: axis, height: 1.0, items };
+    let band = |name, of: fn(&Gained) -> [f64; 2]| Item::Band {
+        name,
+        x: x.clone(),
+        lower: told.iter().map(|own| of(own)[0]).collect(),
+        upper: told.iter().map(|own| of(own)[1]).collect(),
+        role: Role::Uncertainty,
+    };
+    let line = |name, of: fn(&Gained) -> f64, role| Item::Line {
+        name,
+        x: x.clone(),
+        y: told.iter().map(|own| Some(of(own))).collect(),
+        role,
+    };
+    let form = vec![
+        band("process_gain_band", |own| own.form_gain_interval_95),
+        line("process_form_gain", |own| own.form_gain_um, Role::After),
+    ];
+    let count = vec![
+        line("process_parts_saved", |own| own.parts_saved, Role::Stable),
+        line("process_parts_spoilt", |own| own.parts_spoilt, Role::Unstable),
+    ];
+    Some(Figure {
+        id: "gain",
+        title: Message::new("process_gain"),
+        frame: Frame::Stacked,
+        x: Axis::linear("process_part_number", "1"),
+        panels: vec![
+            panel(Axis::linear("process_form_gain", "um"), form),
+            panel(Axis::linear("process_count", "1"), count),
+        ],
+    })
 }
 
 fn numbers(value: &Value) -> Vec<f64> {

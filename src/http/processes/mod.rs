@@ -6,6 +6,9 @@ mod next;
 mod parts;
 mod tables;
 
+pub(super) use figures::FIGURES;
+pub(super) use tables::TABLES;
+
 use axum::body::Body as HttpBody;
 use axum::extract::{Path, Request, State};
 use axum::http::header::{
@@ -28,7 +31,7 @@ use crate::text::Language;
 
 /// Most processes, parts or entries of one page.
 pub(super) const MOST_ITEMS: u32 = 500;
-/// Largest number of a part or an entry that can be asked for.
+/// Largest number of a part or an entry, and largest condition of the next part, that can be asked for.
 pub(super) const MOST_NUMBER: u32 = 1_000_000_000;
 /// As many on a page unless asked for more or fewer.
 pub(super) const DEFAULT_ITEMS: u32 = 50;

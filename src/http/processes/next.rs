@@ -14,7 +14,7 @@ use super::super::negotiate::{self, Media};
 use super::super::problem::Problem;
 use super::super::query::Query;
 use super::super::{App, gate};
-use super::tagged;
+use super::{MOST_NUMBER, tagged};
 use crate::engine::{NextAsked, NextPart, WhichPath, in_language};
 use crate::text::Language;
 
@@ -43,7 +43,7 @@ pub(super) async fn next(
         ..NextAsked::default()
     };
     for name in known.iter().skip(KNOWN.len()) {
-        if let Some(value) = query.number(name, &(0.0..=1e9))? {
+        if let Some(value) = query.number(name, &(0.0..=f64::from(MOST_NUMBER)))? {
             asked.conditions.push(((*name).to_owned(), value));
         }
     }

@@ -14,13 +14,13 @@ use super::super::negotiate::{self, Media};
 use super::super::problem::Problem;
 use super::super::query::Query;
 use super::super::{App, answer};
-use super::figures::{self, FIGURES};
+use super::figures::{self, FIGURES, Said};
 use super::tagged;
-use crate::engine::in_language;
+use crate::engine::{Shelf, in_language};
 use crate::store::processes::KeptPart;
 
 /// Tables of a process.
-const TABLES: &[&str] = &["parts", "changes"];
+pub(in crate::http) const TABLES: &[&str] = &["parts", "changes", "gain", "model"];
 /// Parts that are read at once.
 const PAGE: u32 = 1000;
 
@@ -47,26 +47,79 @@ pub(super) async fn state(
         let id = figure.unwrap_or("chart");
         let figures = figures::all(&app, &caller.shelf(), &process).await?;
         let figure = figures.iter().find(|figure| figure.id == id);
-        let figure = figure.ok_or_else(|| Problem::missing("unknown_figure", id).with("available", "chart"))?;
+        let figure = figure.ok_or_else(|| {
+            Problem::missing("unknown_figure", id)
+                .with("available", figures.iter().map(|figure| figure.id).collect::<Vec<_>>().join(", "))
+        })?;
         let mut response = Response::new(answer::drawn(figure, language).into());
         response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static(Media::Svg.content_type()));
         return Ok(response);
     }
-    let text = if table == Some("changes") {
-        changes(process.state.as_ref())
-    } else {
-        let (mut text, mut from) = (HEADER.to_owned(), 0);
-        loop {
-            let page = app.engine.process_parts(&caller.shelf(), &name, (from, i64::MAX), PAGE).await?;
-            let Some(last) = page.last().and_then(|part| part.number) else { break };
-            from = last + 1;
-            text.extend(page.iter().map(row));
-        }
-        text
+    let state = process.state.as_ref();
+    let text = match table {
+        Some("changes") => changes(state),
+        Some("model") => model(state),
+        Some("gain") => by_part(&app, &caller.shelf(), &name, (GAIN_HEADER, gained)).await?,
+        _ => by_part(&app, &caller.shelf(), &name, (HEADER, row)).await?,
     };
     let mut response = Response::new(text.into());
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/csv; charset=utf-8"));
     Ok(response)
+}
+
+/// A line for each part.
+async fn by_part(
+    app: &App,
+    shelf: &Shelf,
+    process: &str,
+    (header, row): (&str, fn(&KeptPart) -> String),
+) -> Result<String, Problem> {
+    let (mut text, mut from) = (header.to_owned(), 0);
+    loop {
+        let page = app.engine.process_parts(shelf, process, (from, i64::MAX), PAGE).await?;
+        let Some(last) = page.last().and_then(|part| part.number) else { return Ok(text) };
+        from = last + 1;
+        text.extend(page.iter().map(row));
+    }
+}
+
+const GAIN_HEADER: &str = "number,part,parts,parts_cut_with_new_path,form_gain_um,form_gain_lower_um,form_gain_upper_um,\
+    parts_saved,parts_saved_lower,parts_saved_upper,parts_spoilt,parts_spoilt_lower,parts_spoilt_upper\n";
+
+/// The account as it was told after a part.
+fn gained(part: &KeptPart) -> String {
+    let Some(told) = Said::after(part).gain else { return String::new() };
+    let with_ends = |value: f64, [lower, upper]: [f64; 2]| format!("{value},{lower},{upper}");
+    let cells = [
+        told.parts.to_string(),
+        told.parts_cut_with_new_path.to_string(),
+        with_ends(told.form_gain_um, told.form_gain_interval_95),
+        with_ends(told.parts_saved, told.parts_saved_interval_95),
+        with_ends(told.parts_spoilt, told.parts_spoilt_interval_95),
+    ];
+    format!("{},{},{}\n", part.number.unwrap_or_default(), part.part, cells.join(","))
+}
+
+/// What the process is taken to be.
+fn model(state: Option<&Value>) -> String {
+    let mut text = "cause,label,parameter,unit,since_part,form,delta,lower,upper\n".to_owned();
+    let sizes = state.and_then(|state| state.pointer("/model/sizes")?.as_array());
+    for size in sizes.into_iter().flatten() {
+        let cells = [
+            "/kind",
+            "/label",
+            "/parameter",
+            "/unit",
+            "/since_part",
+            "/form",
+            "/delta",
+            "/interval_95/0",
+            "/interval_95/1",
+        ]
+        .map(|pointer| size.pointer(pointer).map(plain).unwrap_or_default());
+        let _ = writeln!(text, "{}", cells.join(","));
+    }
+    text
 }
 
 const HEADER: &str = "number,part,state,unused,evidence,chi2,p,change\n";

@@ -24,7 +24,7 @@ class Base(BaseModel):
             if get_origin(field.annotation) is Literal and get_args(field.annotation) == (field.default,):
                 self.__pydantic_fields_set__.add(name)
 
-    def sent(self) -> dict[str, Any]:
+    def as_sent(self) -> dict[str, Any]:
         """As it is sent: what was said, not what was left to its default."""
         return self.model_dump(mode="json", by_alias=True, warnings=False, exclude_unset=True, exclude_none=True)
 

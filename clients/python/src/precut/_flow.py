@@ -181,7 +181,7 @@ def body(job: Any) -> bytes:
 def sendable(part: Any) -> Any:
     """Models, also inside dictionaries and lists, as what is sent."""
     if isinstance(part, Base):
-        return part.sent()
+        return part.as_sent()
     if isinstance(part, Mapping):
         return {key: sendable(value) for key, value in part.items()}
     if isinstance(part, (list, tuple)):
