@@ -128,19 +128,24 @@ impl Schema {
     fn ends_of(&self, value: &Value, schemas: &[&Value], pointer: &str, ends: &mut Vec<(String, Value)>) {
         match value {
             Value::Number(there) => {
-                let names = ["minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"];
-                let all = schemas.iter().flat_map(|schema| names.iter().filter_map(|name| schema[*name].as_f64()));
-                let distinct: BTreeSet<u64> = all.map(f64::to_bits).collect();
-                for end in distinct.into_iter().map(f64::from_bits) {
-                    // What may not be reached itself is come near to.
-                    let inward = if end.abs() > 0.0 { end * (1.0 - 1e-6) } else { 1e-6 };
-                    ends.extend([end, inward].into_iter().filter(|at| there.as_f64() != Some(*at)).map(|at| {
-                        let whole = at.fract().abs() < 1e-12 && at.abs() < 1e15;
-                        #[allow(clippy::cast_possible_truncation)]
-                        let number = if whole { json!(at as i64) } else { json!(at) };
-                        (pointer.to_owned(), number)
-                    }));
-                }
+                // What may not be reached itself is come near to, and so is zero, which often switches off.
+                let near = |end: f64| if end.abs() > 0.0 { end * (1.0 - 1e-6) } else { 1e-6 };
+                let of = |names: [&str; 2]| {
+                    let all = schemas.iter().flat_map(|schema| names.map(|name| schema[name].as_f64()));
+                    all.flatten().collect::<Vec<f64>>()
+                };
+                let reached = of(["minimum", "maximum"]);
+                let zeros = reached.iter().filter(|end| end.abs() <= 0.0).map(|end| near(*end));
+                let beyond = of(["exclusiveMinimum", "exclusiveMaximum"]).into_iter().map(near);
+                let distinct: BTreeSet<u64> =
+                    reached.iter().copied().chain(zeros).chain(beyond).map(f64::to_bits).collect();
+                let others = distinct.into_iter().map(f64::from_bits).filter(|at| there.as_f64() != Some(*at));
+                ends.extend(others.map(|at| {
+                    let whole = at.fract().abs() < 1e-12 && at.abs() < 1e15;
+                    #[allow(clippy::cast_possible_truncation)]
+                    let number = if whole { json!(at as i64) } else { json!(at) };
+                    (pointer.to_owned(), number)
+                }));
             }
             Value::Array(items) => {
                 let last = items.len().saturating_sub(1);
