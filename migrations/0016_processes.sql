@@ -62,3 +62,37 @@ CREATE TABLE process_parts (
     PRIMARY KEY (process, part),
     UNIQUE (process, number)
 ) STRICT;
+
+-- Who is told of a process: callbacks have numbers of their own, and are about a job or about an entry of a record.
+DROP TRIGGER callbacks_of_what_is_over;
+CREATE TABLE callbacks_of_all (
+    id         INTEGER NOT NULL PRIMARY KEY,
+    job        TEXT    UNIQUE REFERENCES precut_jobs (id) ON DELETE CASCADE,
+    process    TEXT    CHECK ((process IS NULL) = (job IS NOT NULL)),
+    sequence   INTEGER CHECK ((sequence IS NULL) = (process IS NULL)),
+    url        TEXT    NOT NULL,
+    -- Host and port of the address: none of them takes the places of all others.
+    host       TEXT    NOT NULL,
+    -- waiting: the job is not over; pending: it is to be told.
+    state      TEXT    NOT NULL CHECK (state IN ('waiting', 'pending', 'delivered', 'given_up')),
+    -- Tries begun.
+    attempts   INTEGER NOT NULL DEFAULT 0,
+    -- When it is tried next; while somebody tries, when he is taken for dead.
+    next_ms    INTEGER CHECK ((next_ms IS NOT NULL) = (state = 'pending')),
+    -- Who tries: only he can write what came of it.
+    lease      TEXT,
+    -- Why the last try came to nothing: a code.
+    fault      TEXT,
+    -- When it was delivered or given up.
+    settled_ms INTEGER,
+    UNIQUE (process, sequence)
+) STRICT;
+INSERT INTO callbacks_of_all (job, url, host, state, attempts, next_ms, lease, fault, settled_ms)
+    SELECT job, url, host, state, attempts, next_ms, lease, fault, settled_ms FROM callbacks;
+DROP TABLE callbacks;
+ALTER TABLE callbacks_of_all RENAME TO callbacks;
+CREATE INDEX callbacks_due ON callbacks (next_ms) WHERE state = 'pending';
+CREATE TRIGGER callbacks_of_what_is_over AFTER UPDATE OF state ON precut_jobs
+WHEN NEW.state IN ('succeeded', 'failed', 'cancelled') BEGIN
+    UPDATE callbacks SET state = 'pending', next_ms = coalesce(NEW.finished_ms, 0) WHERE job = NEW.id AND state = 'waiting';
+END;

@@ -32,4 +32,15 @@ CREATE TABLE precut.process_parts (
     PRIMARY KEY (process, part),
     UNIQUE (process, number)
 );
+-- Who is told of a process: see the SQLite file. Programs that know nothing of it pass what is told of processes over.
+ALTER TABLE precut.callbacks DROP CONSTRAINT callbacks_pkey;
+ALTER TABLE precut.callbacks
+    ALTER COLUMN job DROP NOT NULL,
+    ADD UNIQUE (job),
+    ADD COLUMN id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+    ADD COLUMN process text,
+    ADD COLUMN sequence bigint,
+    ADD UNIQUE (process, sequence),
+    ADD CHECK ((process IS NULL) = (job IS NOT NULL)),
+    ADD CHECK ((sequence IS NULL) = (process IS NULL));
 INSERT INTO precut.versions VALUES (11, 9);

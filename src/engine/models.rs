@@ -31,6 +31,12 @@ impl Shelf {
         Self(format!("{}/", owner.replace('%', "%25").replace('/', "%2F")))
     }
 
+    /// The owner and his name of what is kept under a full name.
+    pub(super) fn split(full: &str) -> (String, &str) {
+        let (owner, name) = full.rsplit_once('/').unwrap_or(("", full));
+        (owner.replace("%2F", "/").replace("%25", "%"), name)
+    }
+
     pub(super) fn full(&self, name: &str) -> String {
         format!("{}{name}", self.0)
     }

@@ -108,6 +108,11 @@ pub(crate) fn port_of(url: &Url) -> u16 {
     url.port_or_known_default().unwrap_or(443)
 }
 
+/// Host and port of an address.
+pub(crate) fn place_of(url: &Url) -> String {
+    format!("{}:{}", host_of(url).unwrap_or_default(), port_of(url))
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {

@@ -24,7 +24,7 @@ use tokio::net::TcpStream;
 use tokio_rustls::TlsConnector;
 use url::Url;
 
-pub(crate) use address::{Reach, host_of, port_of};
+pub(crate) use address::{Reach, host_of, place_of, port_of};
 
 /// Largest header of an answer, bytes.
 const MOST_HEADER_BYTES: usize = 16 << 10;

@@ -99,6 +99,42 @@ struct ProcessBody<A: ToSchema> {
     /// Whether a person stopped it: parts are recorded, nothing is commanded.
     #[schema(default = false, nullable = false)]
     stopped: Option<bool>,
+    /// Who is told when something is said of it: a signed event is posted there. Hosts have to be allowed (`callbacks.hosts`).
+    #[schema(inline, nullable = false)]
+    callback: Option<ProcessCallback>,
+}
+
+/// Who is told what is said of a process.
+#[derive(ToSchema)]
+#[allow(dead_code)] // the contract of a body that the engine reads
+struct ProcessCallback {
+    /// Address.
+    #[schema(max_length = 2048, example = "https://mes.plant.example/precut")]
+    url: String,
+    /// What is told; changes, parts that stand alone and warnings where it is left out.
+    #[schema(nullable = false, min_items = 1, max_items = 7)]
+    events: Option<Vec<ToldEvent>>,
+}
+
+/// What is told of a process.
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[allow(dead_code)] // the contract of a body that the engine reads
+enum ToldEvent {
+    /// A part came or was corrected.
+    Part,
+    /// A part was withdrawn.
+    Withdrawn,
+    /// Parts are unusual; nothing is called a change yet.
+    Warning,
+    /// A change was reported.
+    Change,
+    /// A change joined the model.
+    Accepted,
+    /// A part stands alone.
+    OddPart,
+    /// Parts were judged anew.
+    Replayed,
 }
 
 /// A measured part as it is sent.

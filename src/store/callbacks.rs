@@ -1,12 +1,42 @@
-//! Who is told that a job is over, and what came of it.
+//! Who is told that a job is over, or what is said of a process, and what came of it.
 //!
-//! A callback is a row beside its job. The end of the job, however it comes about, makes it due in the same transaction.
+//! A callback is a row beside its job or beside an entry of a process. The end of the job, however it comes about, makes it due
+//! in the same transaction; that of an entry is due as soon as the entry is there.
 //! Who tries it holds it for a time, as a computation is held under a lease: who dies meanwhile loses it, and it is tried
 //! again. So it is delivered at least once.
 
 use serde::Deserialize;
 
 use super::jobs::{JobId, Lease};
+
+/// What is told.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Subject {
+    /// That a job is over.
+    Job(JobId),
+    /// An entry of the record of a process.
+    Entry {
+        /// Name of the process.
+        process: String,
+        /// Number of the entry.
+        sequence: i64,
+    },
+}
+
+impl Subject {
+    /// As a store keeps it.
+    pub(super) fn read(
+        job: Option<JobId>,
+        process: Option<String>,
+        sequence: Option<i64>,
+    ) -> Result<Self, sqlx::Error> {
+        match (job, process, sequence) {
+            (Some(job), None, None) => Ok(Self::Job(job)),
+            (None, Some(process), Some(sequence)) => Ok(Self::Entry { process, sequence }),
+            _ => Err(sqlx::Error::Decode("a callback is of a job or of an entry".into())),
+        }
+    }
+}
 
 /// Whom to tell.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,8 +101,10 @@ pub struct TakeUp {
 /// A callback that is to be tried now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DueCallback {
-    /// Of which job.
-    pub job: JobId,
+    /// Its number.
+    pub id: i64,
+    /// What is told.
+    pub subject: Subject,
     /// Where.
     pub url: String,
     /// Host and port of it.

@@ -11,7 +11,7 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use uuid::{ContextV7, Timestamp, Uuid};
 
-pub use super::callbacks::{Callback, CallbackState, DueCallback, NewCallback, TakeUp, Tried};
+pub use super::callbacks::{Callback, CallbackState, DueCallback, NewCallback, Subject, TakeUp, Tried};
 pub use super::quota::{Quota, Usage};
 use super::{KeptResult, StoreError};
 use crate::key::Key;

@@ -9,6 +9,7 @@ use sqlx::postgres::PgRow;
 use sqlx::sqlite::SqliteRow;
 
 use super::StoreError;
+use super::callbacks::NewCallback;
 use super::documents::NewDocument;
 use super::quota::{Quota, Usage};
 
@@ -156,6 +157,8 @@ pub struct Addition {
     pub entries: Vec<NewEntry>,
     /// The parts of which something else is said now.
     pub parts: Vec<PartNow>,
+    /// Who is told of which of the entries.
+    pub tells: Vec<(usize, NewCallback)>,
     /// What is said of it now, JSON.
     pub state: Option<String>,
     /// For whom it counts.

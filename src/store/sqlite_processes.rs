@@ -10,6 +10,7 @@ use super::processes::{Added, Addition, Entry, Head, KeptPart, ProcessStore};
 use super::quota::Quota;
 use super::sqlite::SqliteStore;
 use super::sqlite_documents::put;
+use super::sqlite_jobs::callbacks::note_entry;
 use super::sqlite_jobs::usage::usage;
 use super::{StoreError, now_ms};
 
@@ -160,6 +161,10 @@ async fn add(connection: &mut SqliteConnection, new: &Addition, now: i64) -> Res
             }
         };
     }
+    for (place, callback) in &new.tells {
+        let sequence = first.saturating_add(i64::try_from(*place).unwrap_or(i64::MAX));
+        note_entry(connection, (&new.process, sequence), callback, now).await?;
+    }
     let sequence = first - 1 + i64::try_from(new.entries.len()).unwrap_or(0);
     sqlx::query(
         "INSERT INTO processes (name, sequence, state) VALUES (?1, ?2, ?3)
@@ -180,6 +185,7 @@ async fn delete(connection: &mut SqliteConnection, name: &str, at: i64) -> Resul
     }
     sqlx::query("DELETE FROM process_entries WHERE process = ?1").bind(name).execute(&mut *connection).await?;
     sqlx::query("DELETE FROM process_parts WHERE process = ?1").bind(name).execute(&mut *connection).await?;
+    sqlx::query("DELETE FROM callbacks WHERE process = ?1").bind(name).execute(&mut *connection).await?;
     sqlx::query("UPDATE documents SET content = NULL, words = '', bytes = 0 WHERE kind = ?1 AND name = ?2")
         .bind(Kind::Process.word())
         .bind(name)

@@ -11,6 +11,7 @@ use tempfile::NamedTempFile;
 use crate::certificates::{certificate, signed};
 use crate::jobs::lasting;
 use crate::receiver::{Call, Receiver, SECRET, secret_file};
+use crate::stream::process_file;
 use crate::support::{Process, Server, header, problem, toy};
 
 const OTHER_SECRET: &str = "whsec_AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8=";
@@ -85,6 +86,50 @@ async fn whoever_asked_for_it_is_told_in_a_signed_call() {
     assert_eq!(call.json(), event);
     // Told once.
     assert_eq!(receiver.calls().len(), 1);
+    server.stop().await;
+}
+
+/// The tailstock that softened at part 37: of all parts the change alone is told, in a signed call.
+#[tokio::test]
+async fn whom_a_process_names_is_told_of_a_change() {
+    let (receiver, secret) = (Receiver::start(), secret_file(SECRET));
+    let registry = precut::registry::Registry::standard().unwrap();
+    let server = Server::start_of(registry, |config| calling(config, &receiver, &secret)).await;
+    let mut process = process_file("r01-tailstock-softer.json");
+    let Value::Array(parts) = process["parts"].take() else { panic!("a stream without parts") };
+    process.as_object_mut().unwrap().remove("parts");
+    let put = async |path: &str, body: &Value| {
+        let request = server.client.put(server.url(path)).header("content-type", "application/json");
+        request.body(body.to_string()).send().await.unwrap()
+    };
+    let at = "/v1/processes/shaft-560";
+    process["callback"] = json!({ "url": "http://elsewhere.example/", "events": ["change"] });
+    problem(put(at, &process).await, 422, "bad_callback").await;
+    process["callback"] = json!({ "url": receiver.url("/said"), "events": ["chnage"] });
+    let refused = problem(put(at, &process).await, 422, "invalid_process").await;
+    assert_eq!(refused["errors"][0]["pointer"], "/callback/events/0");
+    process["callback"]["events"] = json!(["change"]);
+    assert_eq!(put(at, &process).await.status(), 201);
+    let mut since = None;
+    for (number, part) in (1..).zip(&parts) {
+        let taken = put(&format!("{at}/parts/p-{number}"), part).await;
+        assert_eq!(taken.status(), 201);
+        let said: Value = taken.json().await.unwrap();
+        if said["news"].as_array().unwrap().contains(&json!("change")) {
+            since = Some((number, said));
+            break;
+        }
+    }
+    let (number, said) = since.unwrap();
+    let call = receiver.after(1).await.remove(0);
+    assert_eq!((call.path.as_str(), call.is_signed_with(SECRET)), ("/said", true));
+    let event = call.json();
+    assert_eq!(event["type"], "process.change");
+    assert_eq!(event["data"]["sequence"], said["sequence"]);
+    assert_eq!(event["data"]["said"], said["explanation"][0]["text"]);
+    let part = format!("{at}/parts/p-{number}");
+    assert_eq!(event["data"]["links"], json!({ "self": at, "part": part }));
+    assert_eq!(receiver.calls().len(), 1, "nothing else was wanted");
     server.stop().await;
 }
 

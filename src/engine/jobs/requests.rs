@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{Ask, Feed, Job, Request};
 use crate::engine::memory::{Kept, fingerprint_with};
 use crate::engine::{Body, CacheState, Engine, Error, Known, Solved, Stored, Timings, hit};
-use crate::store::jobs::{DueCallback, JobId, JobKind, JobQuery, JobRecord, JobState, TakeUp, Tried};
+use crate::store::jobs::{DueCallback, JobId, JobKind, JobQuery, JobRecord, JobState, Subject, TakeUp, Tried};
 
 /// What came of a request.
 #[derive(Debug, Clone)]
@@ -157,8 +157,10 @@ impl Engine {
 
     /// Writes what came of a try of a callback.
     pub(crate) async fn settle_callback(&self, due: DueCallback, tried: Tried) -> Result<(), Error> {
-        let job = due.job;
-        if self.inner.jobs.store.settle_callback(due, tried).await? {
+        let subject = due.subject.clone();
+        if self.inner.jobs.store.settle_callback(due, tried).await?
+            && let Subject::Job(job) = subject
+        {
             self.inner.jobs.feeds.touch(&[job]);
         }
         Ok(())

@@ -5,16 +5,22 @@ use std::sync::Arc;
 use precut_calc::calculator::Finding;
 use precut_calc::process::Decision;
 use serde_json::{Map, Value, json};
+use url::Url;
 
 use super::{ProcessError, canonical_text};
 use crate::engine::budget::Room;
 use crate::engine::read::check_body;
 use crate::engine::watch::{lift, not_watched};
 use crate::engine::{Body, Engine, Error, FilePart, Shelf};
+use crate::outward::place_of;
 use crate::registry::{Entry, Observed, Registry, child};
+use crate::store::callbacks::NewCallback;
+use crate::store::processes::EntryKind;
 
 /// What the service adds to the options of a process.
 const PATH: &str = "path";
+/// What is told where a process names no events.
+const TOLD: [&str; 3] = ["change", "odd_part", "warning"];
 
 /// A declared process.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +63,18 @@ impl Document {
         self.sent["options"][PATH] == "auto"
     }
 
+    /// Who is told of an entry of which that is new.
+    pub(super) fn told(&self, kind: EntryKind, news: &[&str]) -> Option<NewCallback> {
+        let callback = self.sent.get("callback")?;
+        let wanted = match callback.get("events").and_then(Value::as_array) {
+            Some(events) => events.iter().filter_map(Value::as_str).collect(),
+            None => TOLD.to_vec(),
+        };
+        let is_wanted = wanted.iter().any(|word| *word == kind.word() || news.contains(word));
+        let url: Url = callback.get("url").and_then(Value::as_str)?.parse().ok().filter(|_| is_wanted)?;
+        Some(NewCallback { host: place_of(&url), url: url.into() })
+    }
+
     pub(super) fn is_stopped(&self) -> bool {
         self.sent["stopped"] == true
     }
@@ -81,7 +99,9 @@ impl Engine {
             Err(error) => return Err(error.into()),
         };
         let model = filled.as_object_mut().and_then(|fields| fields.remove("model"));
-        filled.as_object_mut().and_then(|fields| fields.remove("stopped"));
+        for own in ["stopped", "callback"] {
+            filled.as_object_mut().and_then(|fields| fields.remove(own));
+        }
         filled["options"].as_object_mut().and_then(|options| options.remove(PATH));
         for absent in ["options", "allowances"] {
             if filled[absent].is_null() {

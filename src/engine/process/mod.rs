@@ -285,11 +285,24 @@ impl Engine {
             document: Some(kept),
             entries: vec![entry],
             parts,
+            tells: Vec::new(),
             state: state.map(|state| state.to_string()),
             owner: owner.to_owned(),
             quota: inner.settings.quota,
         };
         Ok(inner.add(addition).await?.is_some())
+    }
+
+    /// An entry that is told, with the owner of the process and his name of it; nothing where the process is gone.
+    pub(crate) async fn told_entry(
+        &self,
+        process: &str,
+        sequence: i64,
+    ) -> Result<Option<(String, String, Entry)>, Error> {
+        let mut entries = self.inner.processes.process_entries(process.to_owned(), sequence - 1, 1, false).await?;
+        let (owner, name) = Shelf::split(process);
+        let entry = entries.pop().filter(|entry| entry.sequence == sequence);
+        Ok(entry.map(|entry| (owner, name.to_owned(), entry)))
     }
 
     /// A process.
@@ -422,6 +435,7 @@ impl Engine {
                 document: None,
                 entries: vec![entry],
                 parts: Vec::new(),
+                tells: Vec::new(),
                 state: state.map(|state| state.to_string()),
                 owner: owner.clone(),
                 quota: inner.settings.quota,

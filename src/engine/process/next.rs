@@ -135,6 +135,7 @@ impl Engine {
                 document: None,
                 entries: vec![entry],
                 parts: Vec::new(),
+                tells: Vec::new(),
                 state: live.state(process, live.sequence + 1).map(|state| state.to_string()),
                 owner: owner.to_owned(),
                 quota: inner.settings.quota,

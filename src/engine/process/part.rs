@@ -377,12 +377,14 @@ impl Inner {
             said: said.to_string(),
             created_ms: None,
         };
+        let tells = live.document.told(kind, &news).map(|callback| (0, callback)).into_iter().collect();
         let addition = Addition {
             process: full.to_owned(),
             after: Some(live.sequence),
             document: None,
             entries: vec![entry],
             parts,
+            tells,
             state: Some(state.to_string()),
             owner: owner.to_owned(),
             quota: self.settings.quota,
@@ -443,6 +445,8 @@ impl Live {
             document: None,
             entries,
             parts,
+            // A history that comes at once happened long ago.
+            tells: Vec::new(),
             state,
             owner: owner.to_owned(),
             quota: crate::store::jobs::Quota::default(),

@@ -123,6 +123,7 @@ impl Engine {
             document: Some(kept),
             entries,
             parts: parts.collect(),
+            tells: Vec::new(),
             state: live.state(name, live.sequence).map(|state| state.to_string()),
             owner,
             quota: inner.settings.quota,

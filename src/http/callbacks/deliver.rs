@@ -11,9 +11,9 @@ use tracing::Instrument;
 use url::Url;
 
 use super::Callbacks;
-use super::event::JobEvent;
+use super::event::{JobEvent, ProcessEvent};
 use super::sign::signatures;
-use crate::engine::{DueCallback, Engine, Error, Job, TakeUp, Tried};
+use crate::engine::{DueCallback, Engine, Subject, TakeUp, Tried};
 use crate::http::App;
 use crate::http::gate::{TRACEPARENT, TRACESTATE};
 use crate::outward::{Fault, Outward};
@@ -48,7 +48,7 @@ pub(in crate::http) async fn deliver(app: App, mut stop: watch::Receiver<bool>) 
     }
     let outward = match Outward::new(callbacks.reach, callbacks.timeout) {
         Ok(outward) => outward,
-        Err(error) => return tracing::error!(%error, "nobody can be told that a job is over"),
+        Err(error) => return tracing::error!(%error, "nobody can be told of jobs and processes"),
     };
     let (mut tries, mut busy) = (JoinSet::new(), HashMap::<String, u32>::new());
     loop {
@@ -90,7 +90,7 @@ async fn due(engine: &Engine, callbacks: &Callbacks, free: usize, busy: &HashMap
     };
     engine.take_up_callbacks(wanted).await.unwrap_or_else(|error| {
         metrics::counter!("precut_store_failures_total", "operation" => "callbacks").increment(1);
-        tracing::warn!(%error, "it is not known who is to be told that a job is over");
+        tracing::warn!(%error, "it is not known who is to be told");
         Vec::new()
     })
 }
@@ -98,12 +98,11 @@ async fn due(engine: &Engine, callbacks: &Callbacks, free: usize, busy: &HashMap
 /// Tries once, and puts down what came of it; the host that was called.
 async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
     let host = due.host.clone();
-    let job = app.engine.job(due.job).await;
-    let record = job.as_ref().ok().map(|job| &job.record);
-    let given = record.and_then(|job| TraceContext::of_record(job.traceparent.as_deref(), job.tracestate.as_deref()));
+    let told = Told::of(&app, &due.subject).await;
+    let given = told.as_ref().ok().and_then(|told| told.trace.clone());
     let span = tracing::info_span!(
         "callback",
-        job = %due.job,
+        subject = name_of(&due.subject),
         host = due.host,
         attempt = due.attempt,
         trace = given.as_ref().map(|given| tracing::field::display(given.trace()))
@@ -113,14 +112,14 @@ async fn tell(app: App, outward: Outward, due: DueCallback) -> String {
     }
     let place = trace::place_of(&span, given);
     let told = async {
-        let outcome = tried(&app, &outward, (&due, job), place).await;
+        let outcome = tried(&app, &outward, (&due, told), place).await;
         let (tried, label) = match outcome {
             Ok(()) => (Tried::Delivered, "delivered"),
             Err(miss) => what_now(&app.callbacks.pauses, due.attempt, miss),
         };
         metrics::counter!("precut_callbacks_total", "outcome" => label).increment(1);
         match &tried {
-            Tried::Delivered => tracing::info!("told that the job is over"),
+            Tried::Delivered => tracing::info!("told"),
             Tried::Again { fault, .. } => tracing::info!(fault, "not told; it is tried again"),
             Tried::GivenUp { fault } => tracing::warn!(fault, "not told; it is given up"),
         }
@@ -173,11 +172,57 @@ fn what_now(pauses: &[Duration], attempt: u32, miss: Miss) -> (Tried, &'static s
     }
 }
 
+/// What is told, in a log.
+fn name_of(subject: &Subject) -> String {
+    match subject {
+        Subject::Job(job) => job.to_string(),
+        Subject::Entry { process, sequence } => format!("{process} {sequence}"),
+    }
+}
+
+/// What is told.
+struct Told {
+    /// What the call is known by: the same at every try, and of nothing else.
+    id: String,
+    /// Whose secrets sign it.
+    owner: String,
+    trace: Option<TraceContext>,
+    body: Bytes,
+}
+
+impl Told {
+    async fn of(app: &App, subject: &Subject) -> Result<Self, &'static str> {
+        let unreadable = |error: &dyn std::fmt::Display| {
+            tracing::warn!(%error, "what is to be told cannot be read");
+            INTERNAL
+        };
+        let written = |event: serde_json::Result<Vec<u8>>| event.map(Bytes::from).map_err(|_| INTERNAL);
+        match subject {
+            Subject::Job(id) => {
+                let job = app.engine.job(*id).await.map_err(|error| unreadable(&error))?;
+                let event = JobEvent::of(&job).ok_or(INTERNAL)?;
+                let record = job.record;
+                let trace = TraceContext::of_record(record.traceparent.as_deref(), record.tracestate.as_deref());
+                let body = written(serde_json::to_vec(&event))?;
+                Ok(Self { id: id.to_string(), owner: record.owner, trace, body })
+            }
+            Subject::Entry { process, sequence } => {
+                let entry = app.engine.told_entry(process, *sequence).await.map_err(|error| unreadable(&error))?;
+                let (owner, name, entry) = entry.ok_or(INTERNAL)?;
+                // A process may be deleted and declared anew, and its record begins with 1 again.
+                let id = format!("{name}.{sequence}.{}", entry.created_ms);
+                let body = written(serde_json::to_vec(&ProcessEvent::of(name, &entry)))?;
+                Ok(Self { id, owner, trace: None, body })
+            }
+        }
+    }
+}
+
 /// One try; why it came to nothing.
 async fn tried(
     app: &App,
     outward: &Outward,
-    (due, job): (&DueCallback, Result<Job, Error>),
+    (due, told): (&DueCallback, Result<Told, &'static str>),
     place: Option<TraceContext>,
 ) -> Result<(), Miss> {
     let url: Url = due.url.parse().map_err(|_| INTERNAL)?;
@@ -185,17 +230,12 @@ async fn tried(
     if !app.callbacks.may_be_called(&url) {
         return Err("host_not_allowed".into());
     }
-    let job = job.map_err(|error| {
-        tracing::warn!(%error, "the job cannot be read");
-        INTERNAL
-    })?;
-    let secrets = app.callbacks.secrets.of(&job.record.owner).await.map_err(|error| {
+    let Told { id, owner, body, .. } = told?;
+    let secrets = app.callbacks.secrets.of(&owner).await.map_err(|error| {
         tracing::error!("{error}");
         "no_secret"
     })?;
-    let event = JobEvent::of(&job).ok_or(INTERNAL)?;
-    let body = Bytes::from(serde_json::to_vec(&event).map_err(|_| INTERNAL)?);
-    let (id, now_s) = (due.job.to_string(), jiff::Timestamp::now().as_second());
+    let now_s = jiff::Timestamp::now().as_second();
     let mut headers = HeaderMap::new();
     let texts = [
         (SIGNATURE, Some(signatures(&secrets, &id, now_s, &body))),

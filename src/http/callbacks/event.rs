@@ -1,10 +1,12 @@
-//! What is sent when a job is over.
+//! What is sent when a job is over, and when something is said of a process.
 
 use serde::Serialize;
+use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::engine::{Job, JobState};
 use crate::http::problem::Problem;
+use crate::store::processes::Entry;
 
 /// What is posted to a callback. It says the same at every try.
 #[derive(Debug, Serialize, ToSchema)]
@@ -63,6 +65,86 @@ struct JobEventLinks {
     this: String,
     /// Its result.
     result: String,
+}
+
+/// What is posted to whom a process names. It says the same at every try.
+#[derive(Debug, Serialize, ToSchema)]
+pub(in crate::http) struct ProcessEvent {
+    /// What happened: `process.` and the first of `data.news`, or the kind of the entry where nothing is new.
+    #[serde(rename = "type")]
+    #[schema(example = "process.change")]
+    kind: String,
+    /// When it happened, UTC.
+    #[schema(format = DateTime, example = "2026-02-03T10:15:04.512Z")]
+    timestamp: String,
+    /// The process.
+    data: ProcessEventData,
+}
+
+/// The process of which something is said.
+#[derive(Debug, Serialize, ToSchema)]
+struct ProcessEventData {
+    /// Its name.
+    #[schema(example = "shaft-560")]
+    process: String,
+    /// Number of the entry in its record.
+    #[schema(minimum = 1, example = 41)]
+    sequence: i64,
+    /// The part that it is about.
+    #[schema(example = "2026-02-03-0039")]
+    part: Option<String>,
+    /// Number of that part; null where it was withdrawn.
+    #[schema(example = 39)]
+    number: Option<i64>,
+    /// What is new, the weightiest first.
+    #[schema(example = json!(["change"]))]
+    news: Vec<String>,
+    /// What the process is said to be.
+    #[schema(example = "changed")]
+    state: Option<String>,
+    /// What is said first of it, in English.
+    #[schema(example = "Since part 37 the tailstock is softer.")]
+    said: Option<String>,
+    /// Where to go from here.
+    links: ProcessEventLinks,
+}
+
+/// Addresses of the process.
+#[derive(Debug, Serialize, ToSchema)]
+struct ProcessEventLinks {
+    /// The process itself.
+    #[serde(rename = "self")]
+    this: String,
+    /// The part.
+    part: Option<String>,
+}
+
+impl ProcessEvent {
+    /// Words of news by weight.
+    const NEWS: [&str; 5] = ["change", "accepted", "odd_part", "warning", "replayed"];
+
+    /// That of an entry in the record of a process.
+    pub(super) fn of(process: String, entry: &Entry) -> Self {
+        let said: Value = serde_json::from_str(&entry.said).unwrap_or_default();
+        let is_new = |word: &&str| said["news"].as_array().is_some_and(|news| news.iter().any(|own| own == word));
+        let news: Vec<String> = Self::NEWS.into_iter().filter(is_new).map(ToOwned::to_owned).collect();
+        let text = |pointer: &str| said.pointer(pointer).and_then(Value::as_str).map(ToOwned::to_owned);
+        let this = format!("/v1/processes/{process}");
+        Self {
+            kind: format!("process.{}", news.first().unwrap_or(&entry.kind)),
+            timestamp: format!("{:.3}", jiff::Timestamp::from_millisecond(entry.created_ms).unwrap_or_default()),
+            data: ProcessEventData {
+                sequence: entry.sequence,
+                part: entry.part.clone(),
+                number: entry.number,
+                news,
+                state: text("/state"),
+                said: text("/explanation/0/text"),
+                links: ProcessEventLinks { part: entry.part.as_ref().map(|part| format!("{this}/parts/{part}")), this },
+                process,
+            },
+        }
+    }
 }
 
 impl JobEvent {

@@ -1,4 +1,4 @@
-//! Webhooks: whoever sent a job with `?callback=URL` is told when it is over.
+//! Webhooks: whoever sent a job with `?callback=URL` is told when it is over, and whom a process names is told what is said of it.
 //!
 //! What is sent is small, signed (Standard Webhooks), and says the same at every try. It goes to hosts alone that whoever
 //! runs the service has named, and of their addresses to none of a private network unless he said so.
@@ -17,9 +17,9 @@ use utoipa::ToSchema;
 use super::problem::Problem;
 use crate::config::{self, allowed_host, seconds};
 use crate::engine::{Callback, CallbackState, NewCallback};
-use crate::outward::{Reach, host_of, port_of};
+use crate::outward::{Reach, host_of, place_of, port_of};
 pub(super) use deliver::deliver;
-pub(super) use event::JobEvent;
+pub(super) use event::{JobEvent, ProcessEvent};
 use sign::Secrets;
 
 /// The setting that names who may be called.
@@ -76,9 +76,9 @@ impl Callbacks {
             return Err(refused("more_than_an_address"));
         }
         if !self.may_be_called(&url) {
-            return Err(refused("host").with("received", place(&url)).with("setting", SETTING));
+            return Err(refused("host").with("received", place_of(&url)).with("setting", SETTING));
         }
-        Ok(NewCallback { host: place(&url), url: url.into() })
+        Ok(NewCallback { host: place_of(&url), url: url.into() })
     }
 
     fn may_be_called(&self, url: &Url) -> bool {
@@ -89,11 +89,6 @@ impl Callbacks {
         };
         self.hosts.iter().any(is_it)
     }
-}
-
-/// Host and port of an address.
-fn place(url: &Url) -> String {
-    format!("{}:{}", host_of(url).unwrap_or_default(), port_of(url))
 }
 
 /// Whether everything is there that signing needs; if not, what is missing.

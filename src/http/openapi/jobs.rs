@@ -41,6 +41,7 @@ pub(super) fn schemas() -> Vec<(String, RefOr<Schema>)> {
         super::schemas_of::<jobs::JobList>(),
         super::schemas_of::<events::JobProgress>(),
         super::schemas_of::<callbacks::JobEvent>(),
+        super::schemas_of::<callbacks::ProcessEvent>(),
     ]
     .concat()
 }
@@ -99,19 +100,25 @@ pub(super) fn may_become_one(operation: OperationBuilder) -> OperationBuilder {
 
 /// What the service posts to whoever is told that a job is over.
 pub(super) fn callback() -> PathItem {
-    let header = |name, text: &str| parts::parameter(name, ParameterIn::Header, text, parts::string()).build();
-    let body = RequestBodyBuilder::new()
-        .description(Some("The job that is over. The same at every try."))
-        .required(Some(Required::True))
-        .content("application/json", parts::json_of("JobEvent"));
-    let answer = |text: &str| ResponseBuilder::new().description(text);
-    let operation = operation(
+    let over = operation(
         OVER,
         "Is that job over?",
         "Posted to the address that came with a job as `callback`, signed as Standard Webhooks has it. It is delivered at \
          least once; `webhook-id` is the same each time. No redirect is followed, and no body of an answer is read.",
-    )
-    .parameter(header("webhook-id", "Id of the job: the same at every try."))
+    );
+    posted(over, "JobEvent", "The job that is over. The same at every try.")
+}
+
+/// What is posted to an address that is told something.
+pub(super) fn posted(operation: OperationBuilder, event: &str, about: &str) -> PathItem {
+    let header = |name, text: &str| parts::parameter(name, ParameterIn::Header, text, parts::string()).build();
+    let body = RequestBodyBuilder::new()
+        .description(Some(about))
+        .required(Some(Required::True))
+        .content("application/json", parts::json_of(event));
+    let answer = |text: &str| ResponseBuilder::new().description(text);
+    let operation = operation
+    .parameter(header("webhook-id", "Id of what is told: the same at every try."))
     .parameter(header("webhook-timestamp", "When this try was made, seconds since 1970 UTC."))
     .parameter(header(
         "webhook-signature",

@@ -109,7 +109,9 @@ pub fn document(registry: &Registry) -> Value {
             .description(Some("The service that this document comes from."))
             .build()]))
         .paths(paths)
-        .webhooks(Some(PathsBuilder::new().path(jobs::OVER, jobs::callback())))
+        .webhooks(Some(
+            PathsBuilder::new().path(jobs::OVER, jobs::callback()).path(processes::SAID, processes::callback()),
+        ))
         .components(Some(components.build()))
         .build();
     let mut document = stable(serde_json::to_value(&api).expect("a document has only words and numbers"));
@@ -127,6 +129,10 @@ fn called_back(document: &mut Value) {
         let takes_address =
             |parameters: &Vec<Value>| parameters.iter().any(|parameter| parameter["name"] == "callback");
         let Some(id) = operation["operationId"].as_str() else { continue };
+        if id == processes::SAID_TO.0 {
+            operation["callbacks"] = json!({ processes::SAID: { processes::SAID_TO.1: calls[processes::SAID] } });
+            continue;
+        }
         if operation["parameters"].as_array().is_some_and(takes_address) {
             let mut call = calls[jobs::OVER].clone();
             call["post"]["operationId"] = format!("{id}_is_over").into();

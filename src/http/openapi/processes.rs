@@ -8,7 +8,7 @@ use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{Object, ObjectBuilder, SchemaType, Type};
 use utoipa::openapi::{Content, Ref, RefOr, Required, Schema};
 
-use super::parts;
+use super::{jobs, parts};
 use crate::engine::WhichPath;
 use crate::http::processes;
 use crate::registry::Registry;
@@ -16,6 +16,10 @@ use crate::registry::Registry;
 const NAME: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
 const PART: &str = "^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$";
 const EXAMPLE: &str = "shaft-560";
+/// What is posted to whom a process names.
+pub(super) const SAID: &str = "process_said";
+/// The operation that takes the address for it, and where it stands there.
+pub(super) const SAID_TO: (&str, &str) = ("store_process", "{$request.body#/callback/url}");
 
 /// Address and operations.
 pub(super) fn paths(registry: &Registry) -> Vec<(String, PathItem)> {
@@ -391,6 +395,17 @@ fn store(registry: &Registry) -> OperationBuilder {
     .response("200", changed("It is declared otherwise, or was so already.", "Process"))
     .response("201", changed("It is new.", "Process").header("Location", parts::text_header("Its address.", "/v1/processes/shaft-560")));
     parts::guarded(operation, &[400, 408, 409, 412, 413, 415, 422, 428, 507])
+}
+
+/// What the service posts to whom a process names.
+pub(super) fn callback() -> PathItem {
+    let said = operation(
+        SAID,
+        "What is said of that process?",
+        "Posted to the address that a process names as `callback.url`, when what it wants to hear is new, signed as Standard \
+         Webhooks has it. It is delivered at least once; `webhook-id` is the same each time. A history that comes at once is not told.",
+    );
+    jobs::posted(said, "ProcessEvent", "What is said. The same at every try.")
 }
 
 fn delete() -> OperationBuilder {

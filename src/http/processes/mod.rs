@@ -180,6 +180,9 @@ async fn store(
     let headers = request.headers().clone();
     let owner = gate::owner(&caller, &request);
     let sent = json_of(&app, request).await?;
+    if let Some(url) = sent.pointer("/callback/url").and_then(Value::as_str) {
+        app.callbacks.checked(url.to_owned())?;
+    }
     let condition = (precondition(&headers), owner);
     let (process, is_new) = app.engine.put_process(&caller.shelf(), &name, sent, condition).await?;
     let language = negotiate::language(&headers);

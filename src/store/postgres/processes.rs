@@ -4,6 +4,7 @@ use futures_util::future::BoxFuture;
 use sqlx::postgres::PgConnection;
 
 use super::PostgresStore;
+use super::callbacks::note_entry;
 use super::documents::put;
 use super::usage::{lock_owner, usage};
 use crate::store::StoreError;
@@ -158,6 +159,10 @@ async fn add(connection: &mut PgConnection, new: Addition) -> Result<Added, sqlx
             }
         };
     }
+    for (place, callback) in &new.tells {
+        let sequence = first.saturating_add(i64::try_from(*place).unwrap_or(i64::MAX));
+        note_entry(connection, (&new.process, sequence), callback, now).await?;
+    }
     let sequence = first - 1 + i64::try_from(new.entries.len()).unwrap_or(0);
     sqlx::query("UPDATE precut.processes SET sequence = $2, state = $3 WHERE name = $1")
         .bind(&new.process)
@@ -175,6 +180,7 @@ async fn delete(connection: &mut PgConnection, name: String, at: i64) -> Result<
     }
     sqlx::query("DELETE FROM precut.process_entries WHERE process = $1").bind(&name).execute(&mut *connection).await?;
     sqlx::query("DELETE FROM precut.process_parts WHERE process = $1").bind(&name).execute(&mut *connection).await?;
+    sqlx::query("DELETE FROM precut.callbacks WHERE process = $1").bind(&name).execute(&mut *connection).await?;
     sqlx::query("UPDATE precut.documents SET content = NULL, words = '', bytes = 0 WHERE kind = $1 AND name = $2")
         .bind(Kind::Process.word())
         .bind(name)

@@ -1,6 +1,6 @@
 //! Jobs in the SQLite file. The functions below work inside a transaction of the ledger.
 
-mod callbacks;
+pub(super) mod callbacks;
 mod care;
 mod line;
 pub(super) mod pack;

@@ -2,7 +2,7 @@
 
 use super::{PROBLEM, Place, job, result};
 use crate::store::Store;
-use crate::store::callbacks::{CallbackState, DueCallback, NewCallback, TakeUp, Tried};
+use crate::store::callbacks::{CallbackState, DueCallback, NewCallback, Subject, TakeUp, Tried};
 use crate::store::jobs::{Ending, JobId, NewJob};
 
 fn told(number: u32, host: &str) -> NewJob {
@@ -17,12 +17,17 @@ fn all() -> TakeUp {
 
 async fn due(store: &dyn Store, wanted: TakeUp) -> Vec<DueCallback> {
     let mut due = store.take_up_callbacks(wanted).await.unwrap();
-    due.sort_by_key(|due| due.job);
+    due.sort_by(|a, b| a.subject.cmp(&b.subject));
     due
 }
 
+fn job_of(due: &DueCallback) -> JobId {
+    let Subject::Job(job) = due.subject else { panic!("no job: {due:?}") };
+    job
+}
+
 fn jobs(due: &[DueCallback]) -> Vec<JobId> {
-    due.iter().map(|due| due.job).collect()
+    due.iter().map(job_of).collect()
 }
 
 pub(in crate::store) async fn a_callback_is_due_when_its_job_is_over_however_it_ends<P: Place>() {

@@ -163,6 +163,7 @@ macro_rules! suite {
             documents_count_for_who_stores_them_until_they_are_deleted
         }
         suite! { $place, processes:
+            what_is_told_of_an_entry_is_due_with_it_and_gone_with_the_process
             a_record_grows_without_a_gap_whoever_is_first
             parts_are_corrected_and_withdrawn_with_their_history
             a_process_counts_for_its_owner_until_it_is_deleted

@@ -1,6 +1,7 @@
 //! What every store has to do with the records of processes.
 
 use super::Place;
+use crate::store::callbacks::{NewCallback, Subject, TakeUp, Tried};
 use crate::store::documents::{Kind, NewDocument};
 use crate::store::jobs::Quota;
 use crate::store::processes::{Added, Addition, EntryKind, NewEntry, PartNow};
@@ -45,6 +46,7 @@ fn addition(after: Option<i64>, entries: Vec<NewEntry>) -> Addition {
         document: None,
         parts: parts.collect(),
         entries,
+        tells: Vec::new(),
         state: Some("{}".to_owned()),
         owner: "key:one".to_owned(),
         quota: Quota::default(),
@@ -115,6 +117,30 @@ pub(in crate::store) async fn parts_are_corrected_and_withdrawn_with_their_histo
     assert_eq!(history.iter().map(|entry| entry.content.as_str()).collect::<Vec<_>>(), ["[]", "[2]", "null"]);
     let place = place.again().await;
     assert_eq!(place.store().process(NAME.to_owned()).await.unwrap().unwrap().sequence, 5);
+}
+
+pub(in crate::store) async fn what_is_told_of_an_entry_is_due_with_it_and_gone_with_the_process<P: Place>() {
+    let place = P::new().await;
+    let store = place.store();
+    add(store, declared(None, "{}")).await;
+    let callback = NewCallback { url: "https://mes.example/".to_owned(), host: "mes.example:443".to_owned() };
+    let told = |after, name, number| Addition { tells: vec![(0, callback.clone())], ..part(after, name, number) };
+    add(store, told(1, "a", 1)).await;
+    // Who knows less than is there adds nothing and tells nobody.
+    assert_eq!(add(store, told(1, "b", 2)).await, None);
+    add(store, told(2, "b", 2)).await;
+    let wanted = || TakeUp { most: 100, most_of_one: 100, not_of: Vec::new(), hold_ms: 60_000 };
+    let due = store.take_up_callbacks(wanted()).await.unwrap();
+    let subject = |sequence| Subject::Entry { process: NAME.to_owned(), sequence };
+    let mut subjects: Vec<Subject> = due.iter().map(|due| due.subject.clone()).collect();
+    subjects.sort();
+    assert_eq!(subjects, [subject(2), subject(3)]);
+    assert!(store.take_up_callbacks(wanted()).await.unwrap().is_empty(), "each try is one process's");
+    assert!(store.settle_callback(due[0].clone(), Tried::Delivered).await.unwrap());
+    assert!(!store.settle_callback(due[0].clone(), Tried::Delivered).await.unwrap());
+    assert_eq!(store.counts().await.unwrap().callbacks, 1);
+    assert!(store.delete_process(NAME.to_owned(), 3).await.unwrap());
+    assert_eq!(store.counts().await.unwrap().callbacks, 0);
 }
 
 pub(in crate::store) async fn a_process_counts_for_its_owner_until_it_is_deleted<P: Place>() {
