@@ -76,6 +76,35 @@ fn assert_rest_is_kept(given: &str, compensation: &CompensatedProgram) {
     assert_eq!(compensation.nc_program, expected);
 }
 
+/// A contour as a CAM system writes it: blocks far shorter than what a line has to make to be said to finish.
+#[test]
+fn short_blocks_of_a_contour_are_corrected_together() {
+    let text = include_str!("../src/program_compensation/examples/slender_shaft.json");
+    for step in [0.1, 0.5] {
+        let mut job: Value = serde_json::from_str(text).unwrap();
+        let mut contour = String::new();
+        let count = (198.0 / step) as u32;
+        for block in 1..=count {
+            let along = f64::from(block) * step;
+            let diameter = 22.0 + 0.5 * (std::f64::consts::PI * along / 198.0).sin();
+            let _ = write!(contour, "X{diameter:.3} Z{:.3}{}", -2.0 - along, if block < count { "\n" } else { "" });
+        }
+        let given = job["nc_program"].as_str().unwrap().replace("N180 Z-200.", &contour);
+        job["nc_program"] = json!(given);
+        let answer = try_solve(&job).unwrap();
+        let compensation = compensation(&answer);
+        assert_rest_is_kept(&given, compensation);
+        let proof = compensation.proof.as_ref().unwrap();
+        let said = format!("{step}: {proof:?} {:?}", compensation.left_alone);
+        assert!(proof.largest_error_before_um > 25.0 && proof.largest_residual_um <= RESIDUAL_UM, "{said}");
+        let of_contour = |line: &usize| (18..18 + count as usize).contains(line);
+        let alone = compensation.left_alone.iter().filter(|left| of_contour(&left.line));
+        assert!(alone.clone().all(|left| left.reason == WhyLeftAlone::BelowResolution), "{said}");
+        let changed = compensation.lines_changed.iter().filter(|line| of_contour(line)).count();
+        assert!(changed > count as usize / 2, "{changed} of {count}: {said}");
+    }
+}
+
 #[test]
 fn the_reference_programs_come_out_as_they_are_meant() {
     let mut wrong = String::new();

@@ -13,7 +13,7 @@ use super::sweep::{Shape, Way};
 /// Why a program is not driven over its blank.
 pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
 
-/// A line that owns so much of the surface finishes, mm.
+/// Lines that own so much of the surface finish, mm.
 const FINISHES_MM: f64 = 0.3;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
@@ -100,9 +100,13 @@ pub(crate) fn zero_that_fits(
     Ok(None)
 }
 
-/// Lines that own enough of the surface to be said to finish it.
+/// Lines that own enough of the surface to be said to finish it: alone, or with the lines before and behind them, as the short
+/// blocks of a contour that a CAM system wrote.
 pub(crate) fn lines_that_finish(turned: &Turned) -> Vec<usize> {
-    turned.owned.iter().filter(|(_, length)| **length >= FINISHES_MM).map(|(&line, _)| line).collect()
+    let owned: Vec<(usize, f64)> = turned.owned.iter().map(|(&line, &length)| (line, length)).collect();
+    let runs = owned.chunk_by(|(line, _), (next, _)| line + 1 == *next);
+    let finishing = runs.filter(|run| run.iter().map(|(_, length)| length).sum::<f64>() >= FINISHES_MM);
+    finishing.flatten().map(|(line, _)| *line).collect()
 }
 
 /// The tools that cut and are not described: name and first line.

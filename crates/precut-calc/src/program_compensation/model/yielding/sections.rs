@@ -116,6 +116,10 @@ fn fine([before, after]: [&Chain; 2], [low, high]: [f64; 2], bore_mm: f64, slice
     cuts.extend([low, high]);
     cuts.sort_by(f64::total_cmp);
     cuts.dedup_by(|later, kept| *later - *kept <= 1e3 * SAME_MM);
+    // The stretch ends where it ends, however near to it an outline has a corner: a support may stand there.
+    if let Some(last) = cuts.last_mut() {
+        *last = high;
+    }
     let (mut i, mut j) = (0, 0);
     for ends in cuts.windows(2) {
         let middle = 0.5 * (ends[0] + ends[1]);
@@ -176,6 +180,15 @@ mod tests {
             from = to;
         }
         all
+    }
+
+    #[test]
+    fn slices_fill_the_work_to_its_end() {
+        // A corner of the outline just before the end.
+        let corner = 400.0 - 500.0 * SAME_MM;
+        let chain = Chain::of(&[[0.0, 15.0], [corner, 15.0], [corner, 11.0], [400.0, 11.0]]);
+        let length: f64 = slices(&chain, &chain, 0.0, None).iter().map(|slice| slice.length_mm).sum();
+        assert!((length - 400.0).abs() < SAME_MM, "{length}");
     }
 
     #[test]
