@@ -231,6 +231,7 @@ pub(crate) fn clamping(loads: u32) -> Result<Measured, String> {
         safety: 1.0,
         friction: [&friction; 3],
         clamp_force_n: None,
+        programmes: usize::MAX,
     };
     cpu_time(|| asked.sheet())
 }

@@ -42,7 +42,17 @@ fn friction(fixture: &Fixture) -> Vec<f64> {
 
 fn sheet(fixture: &Fixture, loads: &[Load], safety: f64, clamp_force_n: Option<f64>) -> Sheet {
     let friction = friction(fixture);
-    Asked { fixture, peaks: loads, means: loads, safety, friction: [&friction; 3], clamp_force_n }.sheet().unwrap()
+    Asked {
+        fixture,
+        peaks: loads,
+        means: loads,
+        safety,
+        friction: [&friction; 3],
+        clamp_force_n,
+        programmes: usize::MAX,
+    }
+    .sheet()
+    .unwrap()
 }
 
 /// (22) and (23).
@@ -217,7 +227,8 @@ fn the_force_below_which_slip_is_certain_holds_just_the_load() {
         let fixture = drawn(&mut draw);
         let friction = friction(&fixture);
         let loads: Vec<Load> = (0..4).map(|_| drawn_load(&mut draw)).collect();
-        let alone = |load: &Load| certain_slip_below_n(&fixture, &[*load], 1.0, &friction, &[f64::INFINITY]).unwrap().0;
+        let alone =
+            |load: &Load| certain_slip_below_n(&fixture, &[*load], 1.0, &friction, &[f64::INFINITY], 1).unwrap().0;
         let each: Vec<f64> = loads.iter().map(alone).collect();
         for (load, force_n) in loads.iter().zip(&each).filter(|(_, force_n)| **force_n > 1.0) {
             close(load_factor(&fixture, load, *force_n, &friction).unwrap(), 1.0, 1e-5, "factor");

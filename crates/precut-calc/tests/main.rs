@@ -85,6 +85,7 @@ mod machinability_library;
 mod machinability_real;
 mod material_library;
 mod milling_answers;
+mod milling_clamping;
 mod milling_reference;
 mod path_chords;
 mod process_figures;

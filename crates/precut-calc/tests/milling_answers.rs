@@ -6,12 +6,12 @@ use precut_calc::fixture_stability::FixtureStability;
 use precut_calc::milling_stability::{InstabilityKind, MillingStability, MillingState, Outcome};
 use serde_json::{Value, json};
 
-fn example(id: &str) -> Value {
+pub(crate) fn example(id: &str) -> Value {
     let example = MillingStability::META.examples.iter().find(|example| example.id == id).unwrap();
     serde_json::from_str(example.job).unwrap()
 }
 
-fn merged(mut value: Value, patch: &Value) -> Value {
+pub(crate) fn merged(mut value: Value, patch: &Value) -> Value {
     fn merge(value: &mut Value, patch: &Value) {
         match (value, patch) {
             (Value::Object(into), Value::Object(from)) if !from.contains_key("kind") => {
@@ -30,20 +30,20 @@ fn merged(mut value: Value, patch: &Value) -> Value {
     value
 }
 
-fn faults(job: &Value) -> Vec<Finding> {
+pub(crate) fn faults(job: &Value) -> Vec<Finding> {
     let job: <MillingStability as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
     let mut violations = Violations::default();
     job.check(&mut violations);
     violations.into_vec()
 }
 
-struct Told {
-    outcome: Outcome,
-    warnings: Vec<Finding>,
-    said: Vec<precut_calc::calculator::Message>,
+pub(crate) struct Told {
+    pub(crate) outcome: Outcome,
+    pub(crate) warnings: Vec<Finding>,
+    pub(crate) said: Vec<precut_calc::calculator::Message>,
 }
 
-fn solve(job: &Value) -> Told {
+pub(crate) fn solve(job: &Value) -> Told {
     assert!(faults(job).is_empty(), "{:?}", faults(job));
     let mut job: <MillingStability as Calculator>::Input = serde_json::from_value(job.clone()).unwrap();
     MillingStability::fill(&mut job);
@@ -52,11 +52,11 @@ fn solve(job: &Value) -> Told {
 }
 
 impl Told {
-    fn warns(&self, code: &str) -> bool {
+    pub(crate) fn warns(&self, code: &str) -> bool {
         self.warnings.iter().any(|warning| warning.code == code)
     }
 
-    fn says(&self, code: &str) -> bool {
+    pub(crate) fn says(&self, code: &str) -> bool {
         self.said.iter().any(|message| message.code == code)
     }
 }
@@ -547,7 +547,7 @@ fn drawn(count: usize, seed: u64) -> Vec<Value> {
 }
 
 /// Drawn jobs: `PRECUT_TRIALS` of them, a few where that is not said.
-fn trials(few: usize) -> usize {
+pub(crate) fn trials(few: usize) -> usize {
     std::env::var("PRECUT_TRIALS").ok().and_then(|count| count.parse().ok()).unwrap_or(few)
 }
 

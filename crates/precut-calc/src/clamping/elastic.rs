@@ -146,6 +146,20 @@ impl Rest {
         Some(most)
     }
 
+    /// The load that takes the part off all contacts at once that no clamp force presses on, with the largest force off; `None`
+    /// where one of them always stays.
+    pub fn comes_off(&self, fixture: &Fixture, loads: &[Load], loaded: &[Loaded]) -> Option<Lift> {
+        let unpressed = self.shares.iter().filter(|share| **share <= 0.0).count();
+        let all = loaded.iter().enumerate().filter(|(_, of)| unpressed > 0 && of.lifted.len() == unpressed);
+        let off = all.flat_map(|(load, of)| {
+            of.lifted.iter().map(move |&contact| {
+                let off_n = super::dot(&fixture.contacts[contact].normal, &loads[load].force_n);
+                Lift { contact, load, off_n }
+            })
+        });
+        off.filter(|lift| lift.off_n > 0.0).max_by(|a, b| a.off_n.total_cmp(&b.off_n))
+    }
+
     /// Contacts that loads take off, with the largest force that does.
     pub fn lifts(&self, fixture: &Fixture, loads: &[Load], loaded: &[Loaded]) -> Vec<Lift> {
         let mut found: Vec<Lift> = Vec::new();

@@ -68,19 +68,21 @@ fn least_clamp_n(fixture: &Fixture, cones: &Cones, load: &Load, factor: f64) -> 
 }
 
 /// The least clamp force with which every load, `factor` times as large, can be balanced at all, and the load that asks for it;
-/// `None` where one cannot be. `enough_n` says of each load a force that is known to be enough.
+/// `None` where one cannot be. `enough_n` says of each load a force that is known to be enough; no more than `programmes` loads are
+/// solved, those that may ask for most.
 pub fn certain_slip_below_n(
     fixture: &Fixture,
     loads: &[Load],
     factor: f64,
     friction: &[f64],
     enough_n: &[f64],
+    programmes: usize,
 ) -> Option<(f64, Option<usize>)> {
     let cones = Cones::of(fixture, friction);
     let mut order: Vec<usize> = (0..loads.len()).collect();
     order.sort_by(|a, b| enough_n[*b].total_cmp(&enough_n[*a]));
     let mut most: (f64, Option<usize>) = (0.0, None);
-    for load in order {
+    for load in order.into_iter().take(programmes) {
         if enough_n[load] <= most.0 {
             break;
         }

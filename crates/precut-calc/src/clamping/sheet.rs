@@ -26,6 +26,9 @@ pub struct Asked<'a> {
     pub friction: [&'a [f64]; 3],
     /// The clamp force at hand.
     pub clamp_force_n: Option<f64>,
+    /// Loads for which certain slip is solved at most, those that ask for most first: of fewer what is told stays certain, and may be
+    /// less sharp.
+    pub programmes: usize,
 }
 
 /// The answer.
@@ -41,12 +44,16 @@ pub struct Sheet {
     pub against_mean_n: f64,
     /// Below this the part slips for certain, at the lowest friction; `None` where the programme came to no end.
     pub certain_slip_below_n: Option<f64>,
+    /// The same by the mean loads.
+    pub certain_slip_by_mean_n: Option<f64>,
     /// What asks for the least clamp force; `None` without loads.
     pub decides: Option<Deciding>,
     /// How the clamp force at hand holds.
     pub at_hand: Option<AtHand>,
     /// Contacts that come off.
     pub lifts: Vec<Lift>,
+    /// The load that takes the part off all contacts at once that no clamp force presses on.
+    pub comes_off: Option<Lift>,
     /// Contact by contact, at the clamp force at hand, else at the least.
     pub contacts: Vec<Used>,
 }
@@ -85,19 +92,23 @@ impl Asked<'_> {
             rest.against_slip(loaded, friction).map_or(0.0, |deciding| deciding.clamp_force_n.max(0.0))
         };
         let means = rest.loaded(self.fixture, self.means, self.safety)?;
-        let each: Vec<f64> = loaded.iter().map(|one| least(std::slice::from_ref(one), low)).collect();
+        let certain = |loads: &[Load], loaded: &[Loaded]| {
+            let each: Vec<f64> = loaded.iter().map(|one| least(std::slice::from_ref(one), low)).collect();
+            Some(certain_slip_below_n(self.fixture, loads, self.safety, low, &each, self.programmes)?.0)
+        };
         let clamp_force_min_n = least(&loaded, low);
-        let certain = certain_slip_below_n(self.fixture, self.peaks, self.safety, low, &each);
         let at_hand = self.clamp_force_n.map(|force_n| self.at_hand(&rest, &loaded, force_n)).transpose()?;
         Ok(Sheet {
             clamp_force_min_n,
             at_likely_friction_n: least(&loaded, likely),
             at_high_friction_n: least(&loaded, high),
             against_mean_n: least(&means, low),
-            certain_slip_below_n: certain.map(|(force_n, _)| force_n),
+            certain_slip_below_n: certain(self.peaks, &loaded),
+            certain_slip_by_mean_n: certain(self.means, &means),
             decides: rest.against_slip(&loaded, low),
             at_hand,
             lifts: rest.lifts(self.fixture, self.peaks, &loaded),
+            comes_off: rest.comes_off(self.fixture, self.peaks, &loaded),
             contacts: used(&rest, &loaded, low, self.clamp_force_n.unwrap_or(clamp_force_min_n)),
         })
     }
@@ -105,7 +116,20 @@ impl Asked<'_> {
     fn at_hand(&self, rest: &Rest, loaded: &[Loaded], force_n: f64) -> Result<AtHand, Unheld> {
         let low = self.friction[0];
         let mut certain = Some(LARGEST_FACTOR);
-        for load in self.peaks {
+        let asked_n =
+            |of: &Loaded| rest.against_slip(std::slice::from_ref(of), low).map_or(0.0, |one| one.clamp_force_n);
+        let mut order: Vec<(f64, &Load)> = loaded.iter().map(asked_n).zip(self.peaks).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (_, load) in order.into_iter().take(self.programmes) {
+            // A load that slips nowhere at this factor is balanced at it, too.
+            let one = std::slice::from_ref(load);
+            let holds = |factor: f64| -> Result<bool, Unheld> {
+                let loaded = rest.loaded(self.fixture, one, factor)?;
+                Ok(rest.against_slip(&loaded, low).is_none_or(|asked| asked.clamp_force_n <= force_n))
+            };
+            if certain.map(holds).transpose()? == Some(true) {
+                continue;
+            }
             certain = certain.zip(load_factor(self.fixture, load, force_n, low)).map(|(least, one)| least.min(one));
         }
         Ok(AtHand {

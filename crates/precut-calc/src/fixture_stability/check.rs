@@ -76,15 +76,17 @@ fn check_cut(job: &FixtureJob, violations: &mut Violations) {
     }
 }
 
+/// What is known of a friction stands in order.
+pub(crate) fn check_friction(friction: Friction, at: &str, violations: &mut Violations) {
+    let Friction { low, value, high } = friction;
+    violations.require(low <= value && value <= high, || {
+        Finding::new("frictions_unordered", at).with("low", low).with("value", value).with("high", high)
+    });
+}
+
 fn check_grip(job: &FixtureJob, violations: &mut Violations) {
     let Some(grip) = job.fixture.grip() else { return };
-    let Friction { low, value, high } = grip.friction;
-    violations.require(low <= value && value <= high, || {
-        Finding::new("frictions_unordered", "/fixture/clamp/friction")
-            .with("low", low)
-            .with("value", value)
-            .with("high", high)
-    });
+    check_friction(grip.friction, "/fixture/clamp/friction", violations);
     let faced = grip.jaw_length_mm.is_some() && grip.jaw_height_mm.is_some();
     violations.require(faced || grip.force_height_mm <= 0.0, || {
         let missing = if grip.jaw_length_mm.is_none() { "jaw_length_mm" } else { "jaw_height_mm" };

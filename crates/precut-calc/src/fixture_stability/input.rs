@@ -235,7 +235,7 @@ pub struct Friction {
 
 impl Friction {
     /// Ground steel jaws, dry: a judgement, and warned of.
-    pub(super) const ASSUMED: Self = Self { low: 0.1, value: 0.15, high: 0.2 };
+    pub(crate) const ASSUMED: Self = Self { low: 0.1, value: 0.15, high: 0.2 };
 }
 
 impl Default for Friction {

@@ -60,10 +60,10 @@ pub use output::{
     TextbookForce, VibrationMode, ZerothOrder,
 };
 
-pub(crate) use check::check_characteristic;
+pub(crate) use check::{check_characteristic, check_friction};
 pub(crate) use cutting::engagement_rad;
 pub(crate) use drive::power_kw;
-pub(crate) use plausible::{COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
+pub(crate) use plausible::{CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
 pub use probable_depths::{ProbableDepths, RobustSpeed};
 pub use uncertain::{FixtureCorrelation, FixtureQuantity, FixtureUncertainQuantity, FixtureUncertainty};
 

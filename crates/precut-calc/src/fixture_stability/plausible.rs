@@ -55,7 +55,8 @@ pub(crate) const STATED_RATIO: Guard =
 /// Of an edge.
 pub(crate) const EDGE: Guard =
     Guard { what: "edge_coefficient", unit: "N/mm", usual: (1.0, 200.0), meant: &[(1e-3, "edge_n_per_m")] };
-const CLAMP: Guard = Guard { what: "clamp_force", unit: "N", usual: (50.0, 200_000.0), meant: &[(1e3, "force_kn")] };
+pub(crate) const CLAMP: Guard =
+    Guard { what: "clamp_force", unit: "N", usual: (50.0, 200_000.0), meant: &[(1e3, "force_kn")] };
 const DEFLECTION: Guard =
     Guard { what: "static_deflection", unit: "mm", usual: (0.0, 1.0), meant: &[(1e-3, "stiffness_n_per_um")] };
 

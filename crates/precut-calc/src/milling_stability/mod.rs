@@ -9,15 +9,17 @@ mod job;
 pub mod model;
 
 pub use answer::output::{
+    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampTurn, ClampingStatus, ContactUse,
     CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind, LeadingMultiplier, LobeIntervals,
-    MillingBoundary, MillingCost, MillingEngagement, MillingForces, MillingLobes, MillingMap, MillingMotion,
-    MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, PocketLimit, ProposalKind, RigidLimits,
-    SpeedCurve, SpeedPocket, SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
+    MillingBoundary, MillingClamping, MillingCost, MillingEngagement, MillingForces, MillingLobes, MillingMap,
+    MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, PocketLimit, ProposalKind,
+    RigidLimits, SpeedCurve, SpeedPocket, SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 pub use job::{
-    Asked, Cut, CutLimits, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
-    MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,
-    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingVise,
+    Asked, Coordinate, Cut, CutLimits, CutStation, Cutter, DirectionPart, EdgeForce, FlankRubbing, GrippingContacts,
+    GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle, Milling, NothingYields,
+    PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
+    YieldingMode, YieldingModes, YieldingVise,
 };
 
 use crate::calculator::{
@@ -39,14 +41,14 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 1,
+        version: 2,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction; edges may be helical, pitches, helices and run-out \
                   uneven, and the spindle speed may vary. From that: the Floquet multiplier with its frequencies, every \
                   stretch of depths that is unstable with certified ends, the lobe diagram with its islands, which side and \
                   direction limits (solved with each held rigid), forces, torque and power, the forced motion and the \
-                  surface that it leaves.",
+                  surface that it leaves, and how hard the workpiece must be clamped so that it neither slips, opens nor lifts.",
         references: &[
             "Altintas, Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362",
             "Insperger, Stepan, Updated semi-discretization method for periodic delay-differential equations with discrete delay, Int. J. Numer. Meth. Engng 61 (2004) 117-141",
@@ -68,6 +70,11 @@ impl Calculator for MillingStability {
                 title: "Tool and thin work yield: which of both limits, and what wall is left",
                 job: include_str!("examples/wall.json"),
             },
+            Example {
+                id: "clamped",
+                title: "Part in a vise: does the clamp force at hand hold it along the whole cut?",
+                job: include_str!("examples/clamped.json"),
+            },
         ],
         hallmarks: &[
             Hallmark::Of("/cutter/diameter_mm"),
@@ -83,6 +90,7 @@ impl Calculator for MillingStability {
             "/multiplier/per_tooth",
             "/force/motor_power_kw",
             "/motion/peak_to_peak_um",
+            "/clamping/clamp_force_min_n",
         ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
@@ -112,7 +120,7 @@ impl Calculator for MillingStability {
         let study = Study::new(job, case, monitor)?;
         let (outcome, aside) = outcome(&study, cost(job).ms)?;
         let warnings = advice::warnings(&study, &outcome, &aside);
-        let explanation = advice::explanation(&study, &outcome);
+        let explanation = advice::explanation(&study, &outcome, &aside);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
     }
@@ -145,6 +153,11 @@ const ON_MAP: f64 = 0.5;
 const REFINED: f64 = 1.8;
 /// Multipliers that the trials of pockets take.
 const TRIALS: f64 = 1500.0;
+
+/// Clamping: loads of a period at one place of the cut, on a dozen contacts; of a dozen times as many where the law bends.
+const CLAMPING_MS: f64 = 15.0;
+/// Halvings of the depth at which a clamp force gives out.
+const CLAMP_DEPTHS: f64 = 8.0;
 
 /// Elements of a period: by oscillations, by breaks of the edges, and by what delays bring back.
 fn elements(case: &Case, rotation: &model::Rotation) -> f64 {
@@ -185,6 +198,11 @@ fn cost(job: &Job) -> Cost {
         let repeats = case.milling.teeth_are_alike() && !case.rotation.varies();
         parts.push((if repeats { 0.5 } else { 2.0 } * here, "/cut/spindle_speed_rpm"));
     }
+    let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
+    let clamping_ms = clamping.map_or(0.0, |of| (1.0 + of.stations.len() as f64) * CLAMPING_MS + 0.5 * here);
+    if clamping.is_some() {
+        parts.push((clamping_ms, "/clamping/stations"));
+    }
     let steps = (f64::from(job.limits.depths) / 24.0).max(1.0);
     if job.asks(Asked::Intervals) {
         let others = 2.0 + directions + 2.0 * f64::from(u8::from(case.milling.law.bends()));
@@ -207,6 +225,9 @@ fn cost(job: &Job) -> Cost {
         parts.push((REFINED * speeds * steps * PER_SEARCH * mean, "/lobes/speeds"));
         if job.asks(Asked::Speeds) {
             parts.push((TRIALS * mean, "/lobes/speeds"));
+            if clamping.is_some_and(|of| of.clamp_force().is_some()) {
+                parts.push((REFINED * speeds * CLAMP_DEPTHS * 0.2 * clamping_ms, "/clamping/stations"));
+            }
         }
         if job.asks(Asked::Lobes) && job.lobes.map {
             parts.push((speeds * f64::from(job.lobes.depths) * mean, "/lobes/depths"));
@@ -240,6 +261,14 @@ fn basis(job: &Job) -> Vec<Basis> {
     if job.asks(Asked::Motion) {
         used.push(Basis { equation: "milling/4.20", source: "periodic response of the linear system" });
     }
+    if job.asks(Asked::Clamping) {
+        used.push(Basis {
+            equation: "milling/6.21",
+            source: "loads of a turn on rigid part and contacts with friction",
+        });
+        used.push(Basis { equation: "clamping/4", source: "rigid part on springs with friction" });
+        used.push(Basis { equation: "clamping/3", source: "second-order cone programme" });
+    }
     if job.asks(Asked::Speeds) {
         used.push(Basis { equation: "milling/7.25", source: "limits together, by removal rate" });
     }
@@ -268,6 +297,7 @@ const CODES: Codes = Codes {
         "stage_multiplier",
         "stage_intervals",
         "stage_motion",
+        "stage_clamping",
         "stage_boundary",
         "stage_map",
         "stage_speeds",

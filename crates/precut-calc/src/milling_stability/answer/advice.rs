@@ -1,12 +1,16 @@
 //! What is to be said of an answer, as codes with numbers.
 
 use crate::calculator::{Finding, Message};
-use crate::fixture_stability::{COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
+use crate::fixture_stability::{
+    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, Friction, STATED_FREQUENCY, STATED_RATIO,
+};
 
-use super::super::job::{Asked, EdgeForce, Job, modes};
+use super::super::job::{Asked, EdgeForce, Job, modes, way};
 use super::super::model::Law;
+use super::clamping::is_enough;
 use super::output::{
-    CutterProposal, InstabilityKind, MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
+    ClampCriterion, ClampRemedyKind, CutterProposal, ForceOfSide, InstabilityKind, MillingClamping, MillingState,
+    Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
 };
 use super::proposals::effort;
 use super::{Aside, MODEL_ENDS, Study};
@@ -44,6 +48,8 @@ pub(in crate::milling_stability) const WARNING_CODES: &[&str] = &[
     "motion_beyond_model",
     "no_forced_motion",
     "spindle_acceleration",
+    "jaw_friction_assumed",
+    "clamp_force_short",
 ];
 
 pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
@@ -53,6 +59,14 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "milling_undecided",
     "milling_overloaded",
     "milling_surface_out",
+    "milling_slips",
+    "milling_opens",
+    "milling_comes_off",
+    "clamping_holds_from",
+    "clamping_certain_slip",
+    "clamping_at_hand",
+    "clamping_cannot_hold",
+    "clamping_dynamic",
     "chatter_limit_is",
     "no_chatter_limit",
     "milling_island",
@@ -144,6 +158,7 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
     }
     of_spindle(study, outcome, &mut found);
     found.extend(implausible(job));
+    found.extend(of_clamping(job, outcome));
     if let Some(swing) = aside.beyond_mm {
         let limit = MODEL_ENDS * case.milling.radius_mm;
         found.push(Finding::new("motion_beyond_model", "/cut/depth_mm").measured(swing, limit, "mm"));
@@ -191,6 +206,32 @@ fn of_spindle(study: &Study<'_>, outcome: &Outcome, found: &mut Vec<Finding>) {
     }
 }
 
+fn of_clamping(job: &Job, outcome: &Outcome) -> Vec<Finding> {
+    let (Some(clamping), Some(told)) = (&job.clamping, &outcome.clamping) else { return Vec::new() };
+    let Friction { low, high, .. } = Friction::ASSUMED;
+    let assumed = clamping.frictions().into_iter().filter(|(_, friction)| *friction == Friction::ASSUMED);
+    let mut found: Vec<Finding> = assumed
+        .take(1)
+        .map(|(at, _)| Finding::new("jaw_friction_assumed", at).with("low", low).with("high", high))
+        .collect();
+    if let Some((force, at)) = clamping.clamp_force() {
+        found.extend(CLAMP.on(force, at));
+        if let Some(asked) = told.clamp_force_min_n.filter(|asked| !is_enough(force, *asked)) {
+            found.push(Finding::new("clamp_force_short", at).measured(force, rounded_up(asked), "N"));
+        }
+    }
+    found
+}
+
+/// A force as it is printed, four digits, never less than it was.
+fn rounded_up(force_n: f64) -> f64 {
+    if force_n <= 0.0 {
+        return 0.0;
+    }
+    let step = 10_f64.powf(force_n.log10().floor() - 3.0);
+    (force_n / step * (1.0 - 1e-12)).ceil() * step
+}
+
 /// Numbers that were likely given in another unit. None is changed.
 fn implausible(job: &Job) -> Vec<Finding> {
     let mut found = Vec::new();
@@ -220,7 +261,7 @@ fn implausible(job: &Job) -> Vec<Finding> {
     found
 }
 
-pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
+pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Message> {
     let mut said: Vec<Message> = of_verdict(study, outcome).into_iter().collect();
     if outcome.islands_checked_to_mm.is_some() {
         said.push(match outcome.first_limit_mm {
@@ -254,6 +295,7 @@ pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Out
                 .with("rz_um", wall.roughness_rz_um)
         }));
     }
+    said.extend(outcome.clamping.iter().flat_map(|clamping| holding(study, clamping, work, aside)));
     if outcome.speed_curve.is_some() {
         said.extend(of_speeds(study, outcome));
     }
@@ -285,6 +327,11 @@ fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
             Message::new("milling_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0))
         }
         MillingState::SurfaceOut => Message::new("milling_surface_out"),
+        MillingState::Slips => Message::new("milling_slips")
+            .with("status", outcome.clamping.as_ref().map_or("slips", |clamping| clamping.status.name())),
+        MillingState::Opens => Message::new("milling_opens"),
+        MillingState::Lifts => Message::new("milling_comes_off")
+            .with("off_n", outcome.clamping.as_ref().and_then(|clamping| clamping.comes_off_n).unwrap_or(0.0)),
     }];
     if let Some(time_s) = multiplier.settling_time_s.filter(|time| *time > SLOW_S) {
         said.push(
@@ -293,6 +340,65 @@ fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
                 .with("teeth", (time_s / study.case.tooth_period_s()).ceil())
                 .with("per_tooth", multiplier.per_tooth),
         );
+    }
+    said
+}
+
+/// How hard the workpiece must be clamped, and how the force at hand holds.
+fn holding(study: &Study<'_>, clamping: &MillingClamping, force: &ForceOfSide, aside: &Aside) -> Vec<Message> {
+    let told = |message: Message, name: &'static str, value: Option<f64>| match value {
+        Some(value) => message.with(name, value),
+        None => message,
+    };
+    let mut said = Vec::new();
+    let largest = |low: f64, high: f64| high.abs().max(low.abs());
+    let is_vise = study.job.clamping.as_ref().is_some_and(|clamping| clamping.vise.is_some());
+    let friction = |which: usize| {
+        study.held.iter().flat_map(|held| held.friction[which].iter().copied()).reduce(f64::min).unwrap_or(0.0)
+    };
+    if let (Some(least), Some(likely), Some(by_mean)) =
+        (clamping.clamp_force_min_n, clamping.at_likely_friction_n, clamping.against_mean_n)
+    {
+        let message = Message::new("clamping_holds_from")
+            .with("least_n", rounded_up(least))
+            .with("likely_n", rounded_up(likely))
+            .with("by_mean_n", rounded_up(by_mean))
+            .with("along_n", largest(force.x_min_n, force.x_max_n))
+            .with("across_n", largest(force.y_min_n, force.y_max_n))
+            .with("of", if is_vise { "vise" } else { "contacts" })
+            .with("friction_low", friction(0))
+            .with("friction", friction(1));
+        said.push(match clamping.decides {
+            Some(decides) => message
+                .with("contact", f64::from(decides.contact))
+                .with("criterion", if decides.criterion == ClampCriterion::Slip { "slip" } else { "opening" }),
+            None => message,
+        });
+        if let Some(certain) = clamping.certain_slip_below_n.filter(|certain| *certain < (1.0 - SAME) * least) {
+            said.push(
+                Message::new("clamping_certain_slip").with("certain_n", certain).with("least_n", rounded_up(least)),
+            );
+        }
+    } else {
+        let message = Message::new("clamping_cannot_hold").with("way", aside.free.unwrap_or("unknown"));
+        said.push(match clamping.remedy {
+            Some(remedy) => told(message, "apart_mm", remedy.apart_mm)
+                .with("remedy", if remedy.kind == ClampRemedyKind::Stop { "stop" } else { "second_pair" })
+                .with("presses", way(&[remedy.normal_x, remedy.normal_y, remedy.normal_z, 0.0, 0.0, 0.0]))
+                .with("x_mm", remedy.x_mm)
+                .with("y_mm", remedy.y_mm)
+                .with("z_mm", remedy.z_mm)
+                .with("least_n", rounded_up(remedy.clamp_force_min_n)),
+            None => message,
+        });
+    }
+    let at_hand = study.held.as_ref().and_then(|held| held.clamp_force_n);
+    if let Some((force, safety)) = at_hand.zip(clamping.clamp_safety) {
+        let message = Message::new("clamping_at_hand").with("force_n", force).with("safety", safety);
+        said.push(told(message, "friction_needed", clamping.friction_needed).with("status", clamping.status.name()));
+    }
+    if let Some(factor) = clamping.dynamic_factor.filter(|factor| (factor - 1.0).abs() > SAME) {
+        said.push(Message::new("clamping_dynamic").with("factor", factor));
     }
     said
 }

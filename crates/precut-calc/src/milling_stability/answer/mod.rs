@@ -1,6 +1,7 @@
 //! The answer: numbers, pictures, and what is said of it.
 
 pub(super) mod advice;
+mod clamping;
 mod lobes;
 pub(super) mod output;
 pub(super) mod picture;
@@ -13,15 +14,15 @@ use std::f64::consts::{PI, TAU};
 use crate::calculator::{Failure, Message, Monitor};
 use crate::fixture_stability::power_kw;
 
-use super::job::{Asked, Case, Job, RubbingSource};
+use super::job::{Asked, Case, Held, Job, RubbingSource};
 use super::model::{
     self, Cut, Law, Milling, Multiplier, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan, statics,
     unstable, zeroth,
 };
 use output::{
-    DepthLine, ForceOfSide, FrequencyShare, LeadingMultiplier, MillingCost, MillingEngagement, MillingForces,
-    MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, UnstableInterval, WallSide,
-    WallSurface, YieldingSide,
+    ClampingStatus, DepthLine, ForceOfSide, FrequencyShare, LeadingMultiplier, MillingClamping, MillingCost,
+    MillingEngagement, MillingForces, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions,
+    Outcome, UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 
 const UM_PER_MM: f64 = 1e3;
@@ -52,6 +53,8 @@ pub(super) struct Study<'a> {
     pub examined_mm: f64,
     /// Mean torque of 1 mm of depth.
     torque_at_1_mm_n_m: f64,
+    /// How the workpiece is held, where that is asked for.
+    pub held: Option<Held>,
     pub monitor: &'a dyn Monitor,
 }
 
@@ -62,6 +65,8 @@ pub(super) struct Aside {
     pub beyond_mm: Option<f64>,
     /// No periodic motion was found.
     pub no_motion: bool,
+    /// Along or about which axis nothing holds the workpiece against the cut.
+    pub free: Option<&'static str>,
 }
 
 impl<'a> Study<'a> {
@@ -69,7 +74,9 @@ impl<'a> Study<'a> {
         let zeroth = if case.structure.modes.is_empty() { None } else { zeroth(&case.milling, &case.structure) };
         let examined_mm = examined_mm(job, &case, zeroth);
         let torque_at_1_mm_n_m = statics(&case.milling, 1.0, monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
-        Ok(Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, monitor })
+        let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
+        let held = clamping.and_then(|clamping| clamping.held()?.ok());
+        Ok(Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, held, monitor })
     }
 
     pub(super) fn cut(&self) -> Cut<'_> {
@@ -123,11 +130,17 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let other_assumptions = if seen.is_some() { other_assumptions(study)? } else { OtherAssumptions::default() };
     monitor.progress(0.4, Message::new("stage_motion"));
     let motion = if job.asks(Asked::Motion) { motion(study, &mut aside)? } else { None };
+    monitor.progress(0.45, Message::new("stage_clamping"));
+    let clamping = study.held.as_ref().map(|held| clamping::clamping(study, held)).transpose()?;
+    let clamping = clamping.map(|(clamping, free)| {
+        aside.free = free;
+        clamping
+    });
     let rows = if job.asks(Asked::Lobes) || job.asks(Asked::Speeds) { lobes::rows(study)? } else { Vec::new() };
     let lobes = if job.asks(Asked::Lobes) { Some(lobes::lobes(study, &rows)?) } else { None };
     let first_limit_mm = seen.as_ref().and_then(Scan::first_mm);
     let verdict = multiplier.as_ref().map(|(found, ..)| MillingVerdict {
-        state: state(study, found, &force, motion.as_ref()),
+        state: state(study, found, &force, motion.as_ref(), clamping.as_ref()),
         depth_margin: first_limit_mm.filter(|_| case.depth_mm > 0.0).map(|limit| limit / case.depth_mm),
         drive_margin: drive_margin(&force),
     });
@@ -148,6 +161,7 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
         zeroth_order_min_mm: study.zeroth.map(|zeroth| zeroth.depth_mm),
         zeroth_order_frequency_hz: study.zeroth.map(|zeroth| zeroth.frequency_hz),
         motion,
+        clamping,
         lobes,
         speeds: Vec::new(),
         speed_curve: None,
@@ -207,12 +221,16 @@ fn state(
     multiplier: &LeadingMultiplier,
     force: &MillingForces,
     motion: Option<&MillingMotion>,
+    clamping: Option<&MillingClamping>,
 ) -> MillingState {
     if (multiplier.modulus - 1.0).abs() <= multiplier.modulus_error {
         return MillingState::Undecided;
     }
     if multiplier.modulus > 1.0 {
         return MillingState::Chatter;
+    }
+    if let Some(state) = clamping.and_then(loose) {
+        return state;
     }
     if drive_margin(force).is_some_and(|margin| margin < 1.0) {
         return MillingState::Overloaded;
@@ -227,6 +245,15 @@ fn state(
             })
     });
     if is_out { MillingState::SurfaceOut } else { MillingState::Stable }
+}
+
+/// How a clamping fails, the worst first.
+fn loose(clamping: &MillingClamping) -> Option<MillingState> {
+    match clamping.status {
+        ClampingStatus::Slips | ClampingStatus::Creeps | ClampingStatus::CannotHold => Some(MillingState::Slips),
+        ClampingStatus::Opens => Some(MillingState::Opens),
+        ClampingStatus::Holds | ClampingStatus::NoForceGiven => clamping.comes_off_n.map(|_| MillingState::Lifts),
+    }
 }
 
 fn drive_margin(force: &MillingForces) -> Option<f64> {

@@ -4,14 +4,14 @@ use std::borrow::Cow;
 
 use crate::calculator::{Axis, Cells, Column, Figure, Frame, Item, Message, Panel, Place, Role, Said, Setting, Table};
 
-use super::super::job::Job;
+use super::super::job::{Job, PartClamping};
 use super::output::{
     ForceOfSide, LobeIntervals, MillingBoundary, MillingLobes, MillingMap, Outcome, SpeedCurve, SpeedPocket, WallSide,
 };
 
-pub(in crate::milling_stability) const FIGURE_IDS: &[&str] = &["lobes", "speeds", "depth_line", "surface"];
+pub(in crate::milling_stability) const FIGURE_IDS: &[&str] = &["lobes", "speeds", "depth_line", "surface", "clamping"];
 pub(in crate::milling_stability) const TABLE_IDS: &[&str] =
-    &["lobes", "intervals", "lobe_intervals", "map", "speeds", "speed_curve", "modes", "force", "surface"];
+    &["lobes", "intervals", "lobe_intervals", "map", "speeds", "speed_curve", "modes", "force", "surface", "contacts"];
 
 /// Codes that the figures utter.
 pub(in crate::milling_stability) const LABEL_CODES: &[&str] = &[
@@ -40,6 +40,12 @@ pub(in crate::milling_stability) const LABEL_CODES: &[&str] = &[
     "wall_up",
     "wall_down",
     "allowed_surface_error",
+    "rotation_of_cutter",
+    "clamp_force",
+    "clamp_force_asked",
+    "clamp_force_at_hand",
+    "certain_slip_below",
+    "milling_clamping",
     "milling_lobes",
     "milling_depth_line",
     "milling_surface",
@@ -70,6 +76,7 @@ pub(in crate::milling_stability) fn figures(job: &Job, outcome: &Outcome) -> Vec
     figures.extend(speeds(job, outcome));
     figures.extend(depth_line(job, outcome));
     figures.extend(surface(job, outcome));
+    figures.extend(clamping(job, outcome));
     figures
 }
 
@@ -219,6 +226,22 @@ fn surface(job: &Job, outcome: &Outcome) -> Option<Figure> {
     Some(figure("surface", "milling_surface", Axis::linear("height_of_wall", "mm"), vec![panel]))
 }
 
+/// Clamp force that a turn asks for, against that at hand.
+fn clamping(job: &Job, outcome: &Outcome) -> Option<Figure> {
+    let of = outcome.clamping.as_ref()?;
+    let x = &of.over_turn.rotation_deg;
+    let ends = [*x.first()?, *x.last()?];
+    let level = |name: &'static str, force: Option<f64>, role: Role| {
+        force.map(|force| line(name, &ends, vec![Some(force); 2], role))
+    };
+    let mut items = vec![line("clamp_force_asked", x, some(&of.over_turn.clamp_force_n), Role::Plain)];
+    items.extend(level("certain_slip_below", of.certain_slip_below_n, Role::Limit));
+    let at_hand = job.clamping.as_ref().and_then(PartClamping::clamp_force);
+    items.extend(level("clamp_force_at_hand", at_hand.map(|(force, _)| force), Role::Command));
+    let panel = Panel { y: Axis::linear("clamp_force", "N"), height: 1.0, items };
+    Some(figure("clamping", "milling_clamping", Axis::linear("rotation_of_cutter", "deg"), vec![panel]))
+}
+
 /// The job of a place in the lobe diagram: speed and depth to three digits, the feed per tooth as it is.
 pub(in crate::milling_stability) fn at_place(job: &Job, place: &Place<'_>) -> Option<Job> {
     let is_lobes = place.figure == "lobes" && place.setting == "working_point" && place.x > 0.0 && place.y > 0.0;
@@ -271,6 +294,7 @@ pub(in crate::milling_stability) fn tables(outcome: &Outcome) -> Vec<Table> {
         modes(outcome),
         force(outcome),
         wall_table(outcome),
+        contacts(outcome),
     ]
 }
 
@@ -379,6 +403,24 @@ fn force(outcome: &Outcome) -> Table {
             Column::numbers("mean", "N", &of(|side| [side.x_mean_n, side.y_mean_n, side.z_mean_n])),
             Column::numbers("min", "N", &of(|side| [side.x_min_n, side.y_min_n, side.z_min_n])),
             Column::numbers("max", "N", &of(|side| [side.x_max_n, side.y_max_n, side.z_max_n])),
+        ],
+    }
+}
+
+fn contacts(outcome: &Outcome) -> Table {
+    let rows = outcome.clamping.as_ref().map_or(&[][..], |clamping| &clamping.contacts);
+    let counted: Vec<f64> = (1..=rows.len()).map(|number| number as f64).collect();
+    Table {
+        id: "contacts",
+        columns: vec![
+            Column::numbers("contact", "1", &counted),
+            numbers("x", "mm", rows, |row| Some(row.x_mm)),
+            numbers("y", "mm", rows, |row| Some(row.y_mm)),
+            numbers("z", "mm", rows, |row| Some(row.z_mm)),
+            numbers("rest", "N", rows, |row| Some(row.rest_n)),
+            numbers("least_normal", "N", rows, |row| Some(row.least_normal_n)),
+            numbers("tangential", "N", rows, |row| Some(row.tangential_n)),
+            numbers("friction_used", "percent", rows, |row| row.friction_used_percent),
         ],
     }
 }

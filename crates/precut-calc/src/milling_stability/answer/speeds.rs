@@ -5,7 +5,9 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Message, checkpoint};
 use crate::fixture_stability::power_kw;
 
+use super::super::job::{CutLimits, Held};
 use super::super::model::{Cut, Mode, Rotation, Structure, statics};
+use super::clamping::is_enough;
 use super::lobes::{Row, rotation_at};
 use super::output::{MillingState, Outcome, PocketLimit, SpeedCurve, SpeedPocket, SpeedStatus};
 use super::{MM3_PER_CM3, MODEL_ENDS, N_MM_PER_N_M, Study, UM_PER_MM, surface};
@@ -137,10 +139,9 @@ fn estimate(study: &Study<'_>, rows: &[Row], k: usize) -> Option<Depth> {
     (least.0 > 0.0).then_some(Depth { depth_mm: least.0, binds: least.1 })
 }
 
-/// The same kept within motion, surface error and roughness, where they are limited.
+/// The same kept within clamp force, motion, surface error and roughness, where they are limited.
 fn surface_holds(study: &Study<'_>, spindle_rpm: f64, depth: Depth) -> Result<Depth, Failure> {
-    let limits = &study.job.limits;
-    if limits.amplitude_max_um.or(limits.surface_error_max_um).or(limits.roughness_max_um).is_none() {
+    if !is_limited(study) {
         return Ok(depth);
     }
     let Ok(rotation) = rotation_at(study, spindle_rpm) else { return Ok(depth) };
@@ -156,9 +157,33 @@ fn surface_holds(study: &Study<'_>, spindle_rpm: f64, depth: Depth) -> Result<De
     Ok(Depth { depth_mm: low, binds })
 }
 
+/// The clamping with its force at hand.
+fn clamped<'a>(study: &'a Study<'_>) -> Option<(&'a Held, f64)> {
+    study.held.as_ref().and_then(|held| Some((held, held.clamp_force_n?)))
+}
+
+/// Whether the clamp force, motion or surface limit a depth.
+fn is_limited(study: &Study<'_>) -> bool {
+    clamped(study).is_some() || limits_motion(&study.job.limits)
+}
+
+/// Whether motion or surface do.
+fn limits_motion(limits: &CutLimits) -> bool {
+    limits.amplitude_max_um.or(limits.surface_error_max_um).or(limits.roughness_max_um).is_some()
+}
+
 /// What passes its limit at a depth.
 fn out(study: &Study<'_>, rotation: Rotation, depth_mm: f64) -> Result<Option<PocketLimit>, Failure> {
+    if let Some((held, force_n)) = clamped(study) {
+        let asked = study.clamp_asked_n(held, &Cut { rotation, depth_mm, ..study.cut() })?;
+        if !asked.is_some_and(|asked| is_enough(force_n, asked)) {
+            return Ok(Some(PocketLimit::ClampForce));
+        }
+    }
     let limits = &study.job.limits;
+    if !limits_motion(limits) {
+        return Ok(None);
+    }
     let Some(left) = left(study, rotation, depth_mm)? else { return Ok(Some(PocketLimit::Amplitude)) };
     let passes = |value: f64, limit: Option<f64>| limit.is_some_and(|limit| value > limit);
     Ok(if passes(left.peak_to_peak_um, limits.amplitude_max_um) {
@@ -259,7 +284,7 @@ fn tried(study: &Study<'_>, spindle_rpm: f64, depth: Depth) -> Result<Option<Spe
     }))
 }
 
-/// Power, torque and surface at a printed depth.
+/// Power, torque, clamp force and surface at a printed depth.
 fn out_of_limits(study: &Study<'_>, rotation: Rotation, depth_mm: f64) -> Result<Option<PocketLimit>, Failure> {
     let [power, torque] = study.drive_depths_mm(rotation.spindle_rpm);
     if power.is_some_and(|limit| depth_mm > limit) {
@@ -268,11 +293,7 @@ fn out_of_limits(study: &Study<'_>, rotation: Rotation, depth_mm: f64) -> Result
     if torque.is_some_and(|limit| depth_mm > limit) {
         return Ok(Some(PocketLimit::Torque));
     }
-    let limits = &study.job.limits;
-    if limits.amplitude_max_um.or(limits.surface_error_max_um).or(limits.roughness_max_um).is_none() {
-        return Ok(None);
-    }
-    out(study, rotation, depth_mm)
+    if is_limited(study) { out(study, rotation, depth_mm) } else { Ok(None) }
 }
 
 /// Structures whose frequencies are off: in all combinations, or together and one by one where there are many modes.

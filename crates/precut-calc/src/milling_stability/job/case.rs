@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use crate::fixture_stability::{Vise, engagement_rad};
 
 use super::super::model::{Law, Milling, Mode, Rotation, Rubbing, Side, Structure, Tooth, Vector};
-use super::input::{Cut, Cutter, EdgeForce, FlankRubbing, Job, Milling as Sense, Yielding, YieldingMode};
+use super::input::{
+    Cut, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, Milling as Sense, Yielding, YieldingMode,
+};
 
 /// Modulations of the speed in a period of the map at most.
 pub(in crate::milling_stability) const MODULATIONS: u32 = 8;
@@ -259,7 +261,12 @@ fn of_vise(vise: &Vise, side: Side) -> Option<Mode> {
 
 /// Of length 1, in the axes of the fixture.
 pub(super) fn direction(mode: &YieldingMode) -> Option<Vector> {
-    let [x, y, z] = mode.direction.as_slice() else { return None };
+    unit(&mode.direction)
+}
+
+/// A direction of length 1; `None` where it has none.
+pub(super) fn unit(direction: &[DirectionPart]) -> Option<Vector> {
+    let [x, y, z] = direction else { return None };
     let length = (x.0 * x.0 + y.0 * y.0 + z.0 * z.0).sqrt();
     (length > 1e-9).then(|| [x.0 / length, y.0 / length, z.0 / length])
 }

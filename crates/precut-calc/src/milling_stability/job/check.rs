@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::calculator::{Check, Finding, Violations};
-use crate::fixture_stability::{Vise, check_characteristic};
+use crate::clamping::Unheld;
+use crate::fixture_stability::{Vise, check_characteristic, check_friction};
 
 use super::super::model::Rotation;
 use super::case::{Case, N_MOST, arc_rad, coefficient, direction, milling, numbers, range_rpm, varying};
@@ -29,6 +30,12 @@ pub(in crate::milling_stability) const CODES: &[&str] = &[
     "chip_floor_needed",
     "teeth_meet",
     "nothing_yields",
+    "clamping_missing",
+    "vise_or_contacts",
+    "frictions_unordered",
+    "nothing_clamped",
+    "clamping_unbalanced",
+    "bad_clamp_force",
     "vise_not_modal",
     "vise_holds_work",
     "rubbing_coefficient",
@@ -53,6 +60,7 @@ impl Check for Job {
         check_cutter(self, violations);
         check_cut(self, violations);
         check_sides(self, violations);
+        check_clamping(self, violations);
         check_force(self, violations);
         check_spindle(self, violations);
         check_cost(self, violations);
@@ -179,6 +187,45 @@ fn check_sides(job: &Job, violations: &mut Violations) {
     }
     let yields = has_vise || modes(job).next().is_some();
     violations.require(!job.asks_stability() || yields, || Finding::new("nothing_yields", "/tool"));
+}
+
+/// Ways in which a part may go, as words.
+const WAYS: [[&str; 2]; 6] =
+    [["+x", "-x"], ["+y", "-y"], ["+z", "-z"], ["about_x", "about_x"], ["about_y", "about_y"], ["about_z", "about_z"]];
+
+/// The axis along or about which a free motion goes most.
+pub(in crate::milling_stability) fn way(free: &[f64; 6]) -> &'static str {
+    let most = (0..6).max_by(|a, b| free[*a].abs().total_cmp(&free[*b].abs())).unwrap_or(0);
+    WAYS[most][usize::from(free[most] < 0.0)]
+}
+
+fn check_clamping(job: &Job, violations: &mut Violations) {
+    let Some(clamping) = &job.clamping else {
+        violations.require(!job.asks(Asked::Clamping), || Finding::new("clamping_missing", "/clamping"));
+        return;
+    };
+    violations.require(clamping.vise.is_some() != clamping.contacts.is_some(), || {
+        let given = if clamping.vise.is_some() { "both" } else { "neither" };
+        Finding::new("vise_or_contacts", "/clamping").with("given", given)
+    });
+    for (at, friction) in clamping.frictions() {
+        check_friction(friction, &at, violations);
+    }
+    let points = clamping.contacts.iter().flat_map(|of| &of.points);
+    for (index, point) in points.enumerate() {
+        violations.require(point.direction().is_some(), || {
+            Finding::new("direction_zero", format!("/clamping/contacts/points/{index}/normal"))
+        });
+    }
+    match clamping.held() {
+        Some(Err(Unheld::NothingClamped)) => {
+            violations.add(Finding::new("nothing_clamped", "/clamping/contacts/points"));
+        }
+        Some(Err(Unheld::Free(free))) => {
+            violations.add(Finding::new("clamping_unbalanced", "/clamping/contacts/points").with("way", way(&free)));
+        }
+        Some(Ok(_)) | None => {}
+    }
 }
 
 fn check_force(job: &Job, violations: &mut Violations) {

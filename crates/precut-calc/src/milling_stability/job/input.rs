@@ -8,6 +8,8 @@ use utoipa::{PartialSchema, ToSchema};
 use crate::fixture_stability::{Spindle, SpindlePoint, Vise};
 use crate::force::choice;
 
+use super::held::PartClamping;
+
 /// A cutter in a cut, what yields of tool and workpiece, and what is to be known before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -32,6 +34,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("machine"))))]
     pub spindle: Option<MillSpindle>,
+    /// How the workpiece is held; needed by the analysis `clamping` alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("machine"))))]
+    pub clamping: Option<PartClamping>,
     /// Rubbing of the flank in the waves that it left, which damps slow cuts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("cut")), ("x-advanced" = json!(true))))]
@@ -42,7 +48,7 @@ pub struct Job {
     pub speed_variation: Option<SpeedVariation>,
     /// What is asked. Force, torque and power and the zeroth order are always told.
     #[serde(default = "usual_analyses")]
-    #[schema(max_items = 6, default = json!(["verdict", "intervals"]), example = json!(["verdict", "intervals", "lobes"]), extensions(("x-group" = json!("numerics"))))]
+    #[schema(max_items = 7, default = json!(["verdict", "intervals"]), example = json!(["verdict", "intervals", "lobes"]), extensions(("x-group" = json!("numerics"))))]
     pub analyses: Vec<Asked>,
     /// What must be kept, and how deep is looked.
     #[serde(default)]
@@ -85,6 +91,7 @@ macro_rules! number {
         impl ToSchema for $name {}
     };
 }
+pub(super) use number;
 
 number!(ToothPitch, "Angle from a tooth to the tooth before it, at the tip.", "deg", "theta_j", 0.1, 360.0, 90.0);
 number!(ToothHelix, "Helix angle of one tooth.", "deg", "eta_j", -80.0, 80.0, 30.0);
@@ -540,6 +547,8 @@ pub enum Asked {
     Lobes,
     /// The motion that the chips force, and the surface that it leaves.
     Motion,
+    /// How hard the workpiece must be clamped so that it neither slips, opens nor lifts.
+    Clamping,
     /// Better speeds, ranked by removal rate within all limits.
     Speeds,
     /// Other pitches, another helix, a varying speed, each tried at the working speed.

@@ -2,10 +2,13 @@
 
 mod case;
 mod check;
+mod held;
 mod input;
 
 pub(super) use case::{Case, N_MOST, range_rpm, varying};
-pub(super) use check::{CODES, modes};
+pub(super) use check::{CODES, modes, way};
+pub(super) use held::Held;
+pub use held::{Coordinate, CutStation, GrippingContacts, GrippingPoint, GrippingVise, PartClamping};
 pub use input::{
     Asked, Cut, CutLimits, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
     MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,

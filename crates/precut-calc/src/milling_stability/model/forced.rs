@@ -12,6 +12,7 @@ use crate::num::gmres::gmres;
 use super::cutter::Vector;
 use super::map::{Acting, Cut, Map};
 use super::multiplier::POINTS;
+use super::structure::Side;
 
 /// Residual of the fixed point, and the largest that is a motion at all.
 const TOLERANCE: f64 = 1e-13;
@@ -51,6 +52,8 @@ pub struct Forced<'a> {
     times: Vec<f64>,
     /// Per element, point by point, in the basis.
     motion: Vec<Vec<f64>>,
+    /// The same of what the springs and dampers of the work are pressed by: its modes with c/k of their velocity.
+    pressed: Vec<Vec<f64>>,
 }
 
 pub(super) fn forced<'a>(
@@ -74,10 +77,17 @@ pub(super) fn forced<'a>(
     if found.residual.is_nan() || found.residual > ACCEPTED {
         return Ok(None);
     }
-    let mut motion = Vec::with_capacity(map.times.len());
+    let (mut motion, mut pressed) = (Vec::with_capacity(map.times.len()), Vec::new());
     let mut state = found.x;
-    map.apply_seen(&mut state, |element, force, q| motion.push(map.motion(element, force, q)));
-    Ok(Some(Forced { cut, rule, times: map.times, motion }))
+    let work = cut.structure.modes.iter().any(|mode| mode.side == Side::Work);
+    map.apply_seen(&mut state, |element, force, q| {
+        motion.push(map.motion(element, force, q));
+        if work {
+            let length_s = map.times[element + 1] - map.times[element];
+            pressed.push(cut.structure.pressed(rule, length_s, force, q));
+        }
+    });
+    Ok(Some(Forced { cut, rule, times: map.times, motion, pressed }))
 }
 
 impl Forced<'_> {
@@ -86,25 +96,41 @@ impl Forced<'_> {
     }
 
     fn inside(&self, element: usize, share: f64) -> Vector {
+        self.between(&self.motion[element], share)
+    }
+
+    /// Between the points of an element.
+    fn between(&self, values: &[f64], share: f64) -> Vector {
         let basis = &self.cut.structure.basis;
         let d = basis.len();
         let mut at = [0.0; 3];
         for (i, weight) in self.rule.weights_at(share).iter().enumerate() {
             for (b, direction) in basis.iter().enumerate() {
                 for (sum, along) in at.iter_mut().zip(direction) {
-                    *sum += weight * self.motion[element][i * d + b] * along;
+                    *sum += weight * values[i * d + b] * along;
                 }
             }
         }
         at
     }
 
-    /// Tool minus work at a time, mm.
-    pub fn at(&self, time_s: f64) -> Vector {
+    /// The element of a time, and how far inside it lies.
+    fn place(&self, time_s: f64) -> (usize, f64) {
         let time = time_s.rem_euclid(self.period_s());
         let element = (self.times.partition_point(|t| *t <= time).max(1) - 1).min(self.times.len() - 2);
-        let share = (time - self.times[element]) / (self.times[element + 1] - self.times[element]);
+        (element, (time - self.times[element]) / (self.times[element + 1] - self.times[element]))
+    }
+
+    /// Tool minus work at a time, mm.
+    pub fn at(&self, time_s: f64) -> Vector {
+        let (element, share) = self.place(time_s);
         self.inside(element, share)
+    }
+
+    /// What the springs and dampers of the work are pressed by at a time, toward the tool's side, mm; 0 where it does not yield.
+    pub(super) fn pressed(&self, time_s: f64) -> Vector {
+        let (element, share) = self.place(time_s);
+        self.pressed.get(element).map_or([0.0; 3], |values| self.between(values, share))
     }
 
     /// Least and largest of each direction, mm.
@@ -207,12 +233,17 @@ impl Forced<'_> {
     }
 }
 
-/// The largest value between two places with one maximum, by the golden section.
-fn golden(mut from: f64, mut to: f64, of: impl Fn(f64) -> f64) -> f64 {
+/// The largest value between two places with one maximum.
+fn golden(from: f64, to: f64, of: impl Fn(f64) -> f64) -> f64 {
+    of(highest(from, to, &of))
+}
+
+/// Where it is, by the golden section.
+pub(super) fn highest(mut from: f64, mut to: f64, of: impl Fn(f64) -> f64) -> f64 {
     const SHARE: f64 = 0.618_033_988_749_894_9;
     for _ in 0..50 {
         let (p, q) = (to - SHARE * (to - from), from + SHARE * (to - from));
         if of(p) < of(q) { from = p } else { to = q }
     }
-    of(0.5 * (from + to))
+    0.5 * (from + to)
 }

@@ -1,5 +1,6 @@
 //! The model: cutter and force, what yields, the map over a period and what follows from it.
 
+mod carried;
 mod cutter;
 mod edge;
 mod forced;
@@ -13,6 +14,7 @@ mod statics;
 mod structure;
 mod zeroth;
 
+pub use carried::{Carried, Instant, Sampling};
 pub use cutter::{Law, Milling, Rubbing, Tensor, Tooth, Vector};
 pub use edge::{Edges, Engagement, Entry};
 pub use forced::{Forced, Roughness, Wall};

@@ -108,7 +108,39 @@ impl Structure {
         self.modes.iter().map(of).collect()
     }
 
-    /// The same with the velocities in front.
+    /// What the springs and dampers of the work are pressed by at the points of an element, sum of d (x + c/k x') over its modes,
+    /// in the basis; by the force at the points and the state at the beginning.
+    pub(super) fn pressed<const P: usize>(
+        &self,
+        rule: &Rule<P>,
+        length_s: f64,
+        force: &[f64],
+        state: &[f64],
+    ) -> Vec<f64> {
+        let d = self.basis.len();
+        let mut pressed = vec![0.0; P * d];
+        let (still, moving) = (self.propagators(rule, length_s), self.velocities(rule, length_s));
+        for (k, mode) in self.modes.iter().enumerate().filter(|(_, mode)| mode.side == Side::Work) {
+            let (along, w) = (&self.directions[k], mode.rad_per_s());
+            let pushed: [f64; P] =
+                std::array::from_fn(|j| along.iter().zip(&force[j * d..]).map(|(a, f)| a * f).sum::<f64>());
+            let (x, v) = (state[2 * k], state[2 * k + 1]);
+            for i in 0..P {
+                let by_force = |row: &[f64; P]| row.iter().zip(&pushed).map(|(a, f)| a * f).sum::<f64>();
+                let (at, rate) = (still[k].at_points[i], moving[k].at_points[i]);
+                let moved = at[0] * x + at[1] * v + by_force(&still[k].points_by_force[i]);
+                // The state of velocities is (x', x w), of which q = (x, x'/w).
+                let speed = rate[0] * v * w + rate[1] * x * w + by_force(&moving[k].points_by_force[i]);
+                let value = moved + 2.0 * mode.damping_ratio / w * speed;
+                for (sum, a) in pressed[i * d..].iter_mut().zip(along) {
+                    *sum += a * value;
+                }
+            }
+        }
+        pressed
+    }
+
+    /// What an element of so many seconds does to each mode, with the velocities in front.
     pub(super) fn velocities<const P: usize>(&self, rule: &Rule<P>, length_s: f64) -> Vec<Propagator<2, P>> {
         let of = |mode: &Mode| {
             let ([[_, up], [down, damped]], [_, push]) = mode.system();
