@@ -14,7 +14,7 @@ use super::{MODEL_ENDS, Study};
 /// A clamp force holds where it is short of what is asked by no more than rounding.
 const ROUNDED: f64 = 1e-9;
 /// Contacts in all programmes for certain slip together: they are the dearest part.
-const PROGRAMMES: usize = 480;
+const PROGRAMMES: usize = 4800;
 /// Contacts in all loads of a period together, roughly.
 const CONTACT_LOADS: f64 = 48_000.0;
 /// Multiplications that a contact takes under a load.
