@@ -1,4 +1,4 @@
-//! `precut compensate`: a program in, the same program out, with X of its finishing cuts shifted.
+//! `precut compensate`: a program in, the same program out, with X of its finishing cuts shifted, its feeds changed, or both.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -142,7 +142,11 @@ fn job_without_program(path: &Path) -> Result<Bytes, Failed> {
     fields.remove("nc_program");
     let mode = fields.entry("mode").or_insert_with(|| json!({}));
     if let Some(mode) = mode.as_object_mut() {
-        mode.insert("kind".to_owned(), json!("compensate"));
+        // What the job asks for beside reading is done.
+        let kind = mode.entry("kind").or_insert_with(|| json!("compensate"));
+        if kind == "read" {
+            *kind = json!("compensate");
+        }
     }
     Ok(job.to_string().into())
 }

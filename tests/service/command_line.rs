@@ -453,6 +453,18 @@ fn a_program_is_corrected_beside_its_job() {
     assert_eq!(precut(&["compensate", &program, "--job", &job, "--in-place"]).status.code(), Some(0));
     assert_eq!(std::fs::read(&program).unwrap(), returned);
 
+    // What the job asks for is done: here feeds alone.
+    let mut feeds: Value = serde_json::from_slice(&std::fs::read(&job).unwrap()).unwrap();
+    feeds["job"]["mode"]["kind"] = "refeed".into();
+    feeds["job"]["refeed"] = serde_json::json!({ "feed_min_mm_per_rev": 0.05, "feed_max_mm_per_rev": 0.4 });
+    std::fs::write(path("feeds.json"), feeds.to_string()).unwrap();
+    std::fs::write(&program, &given).unwrap();
+    let output = precut(&["compensate", &program, "--job", &path("feeds.json"), "--check"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let diff = String::from_utf8_lossy(&output.stdout).into_owned();
+    let new: Vec<&str> = diff.lines().filter(|line| line.starts_with("+N")).collect();
+    assert!(!new.is_empty() && new.iter().all(|line| line.contains("F0.4")), "{diff}");
+
     std::fs::write(&program, b"G21 G18 G99\nG0 X40. Z2.\n#1=2.\nM30\n").unwrap();
     let refused = precut(&["compensate", &program, "--job", &job, "--check"]);
     assert_eq!(refused.status.code(), Some(2));

@@ -97,6 +97,7 @@ mod process_watch;
 mod program_correction;
 mod program_fuzz;
 mod program_reading;
+mod program_refeed;
 mod program_stock;
 mod program_yielding;
 mod receptance_fit;

@@ -162,7 +162,7 @@ fn is_run_by_linuxcnc(program: &str) -> bool {
 
 /// How far the diameter of the returned program, driven as one of its own, is off what was told of it, um, and at how many
 /// places that was looked at.
-fn off_from_told(job: &Value, compensation: &CompensatedProgram) -> (f64, usize) {
+pub(crate) fn off_from_told(job: &Value, compensation: &CompensatedProgram) -> (f64, usize) {
     let returned = try_solve(&again(job, compensation)).unwrap();
     let (told, contour) = (&compensation.contour, &returned.output.yielding.as_ref().unwrap().contour);
     let (mut worst, mut compared) = (0.0_f64, 0);

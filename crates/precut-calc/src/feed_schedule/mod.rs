@@ -53,6 +53,7 @@ mod run;
 mod scatter;
 mod segments;
 mod solve;
+pub(crate) mod stretches;
 mod toolpath;
 mod whole;
 mod words;

@@ -175,7 +175,7 @@ fn by_method(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Fo
 }
 
 /// A failure in the words of the contract.
-fn worded(unsolved: Unsolved, job: &Job) -> Failure {
+pub(super) fn worded(unsolved: Unsolved, job: &Job) -> Failure {
     match unsolved {
         Unsolved::Failed(failure) => failure,
         Unsolved::Infeasible(found) => Failure::Conflicting(Box::new(conflict(*found, job))),

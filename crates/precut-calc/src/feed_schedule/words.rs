@@ -305,7 +305,7 @@ impl Rounding<'_> {
 }
 
 /// Step of a feed.
-fn step_of(feed: f64) -> f64 {
+pub(crate) fn step_of(feed: f64) -> f64 {
     if feed < 20.0 * FEED_STEP { FINE_FEED_STEP } else { FEED_STEP }
 }
 

@@ -9,11 +9,11 @@ mod model;
 
 pub use answer::output::{
     CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
-    Outcome, ProgramError, ReadMoves, Transition, YieldedWork,
+    Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
 };
 pub use job::{
     DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
-    ProgramTool, ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
+    ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
@@ -26,7 +26,7 @@ use crate::calculator::{
 };
 
 use answer::{advice, output, picture, returned};
-use model::{correction, reader, stock, yielding};
+use model::{correction, reader, refeed, stock, yielding};
 
 /// Reads programs for lathes.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 4,
+        version: 5,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -49,7 +49,8 @@ impl Calculator for ProgramCompensation {
                   grooves are passed with a warning. Nothing is guessed. With a blank: the surface that the program leaves on \
                   work and machine that do not yield, which line makes which part of it, and rapid moves through stock. With forces \
                   and supports: what it leaves where they yield, and in mode `compensate` the same program with X of its finishing cuts \
-                  shifted against that, every other line as it was, proved by reading and driving it again.",
+                  shifted against that, every other line as it was, proved by reading and driving it again. In mode `refeed` its feeds become \
+                  the fastest within limits of deflection, roughness, force, power and edges; mode `both` does one after the other.",
         references: &[
             "Fanuc, Operator's manual for lathe systems, G-code systems A, B and C",
             "Siemens, SINUMERIK 840D sl Programming manual, Fundamentals",
@@ -65,6 +66,11 @@ impl Calculator for ProgramCompensation {
                 id: "slender_shaft",
                 title: "Slender shaft between chuck and centre: its program, and the one that leaves no error",
                 job: include_str!("examples/slender_shaft.json"),
+            },
+            Example {
+                id: "faster_feeds",
+                title: "The same shaft: first the fastest feeds within its limits, then X at those",
+                job: include_str!("examples/faster_feeds.json"),
             },
         ],
         hallmarks: &[Hallmark::Of("/dialect"), Hallmark::Of("/mode/kind")],
@@ -87,7 +93,9 @@ impl Calculator for ProgramCompensation {
         // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
         let yielding_ms = if job.force.is_some() { 0.2 * lines as f64 } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
-        let drives = if job.mode.kind == ModeKind::Compensate { 3.0 } else { 1.0 };
+        let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
+        // New feeds drive it until the schedule and what comes out at its feeds are one.
+        let drives = if job.mode.kind.refeeds() { drives + 10.0 } else { drives };
         Cost {
             ms: read_ms + drives * (turned_ms + yielding_ms),
             // A line makes four moves at most; cycles over a contour make some more.
@@ -121,12 +129,29 @@ impl Calculator for ProgramCompensation {
         let finishing = turned.as_ref().map(stock::lines_that_finish).unwrap_or_default();
         warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
-        let corrected = corrected(&program, job, turned.as_ref().zip(yielded.as_ref()), monitor)?;
+        let driven = turned.as_ref().zip(yielded.as_ref());
+        let refed = refed(&program, job, driven, monitor)?;
+        let corrected = match (&refed, driven) {
+            (Some(refed), _) if !job.mode.kind.compensates() => Some(refed.alone(&job.nc_program)),
+            // Feeds change no line's place: supports, contour and blank are those of the given program.
+            (Some(refed), Some((turned, _))) => {
+                let mut again = job.clone();
+                again.nc_program.clone_from(&refed.text);
+                let corrected = corrected(&refed.program, &again, Some((turned, &refed.yielded)), monitor)?;
+                corrected.map(|corrected| refed.joined(corrected, &job.nc_program))
+            }
+            _ => corrected(&program, job, driven, monitor)?,
+        };
         warnings.extend(corrected.iter().flat_map(advice::of_corrected));
-        if job.mode.kind == ModeKind::Compensate && corrected.is_none() {
+        if job.mode.kind != ModeKind::Read && corrected.is_none() {
             warnings.push(Finding::new("program_unsafe", "/nc_program"));
         }
-        let output = output::outcome(&program, &job.drawing, turned.as_ref(), yielded.as_ref(), corrected.as_ref());
+        let output = output::outcome(
+            &program,
+            &job.drawing,
+            (turned.as_ref(), yielded.as_ref()),
+            (corrected.as_ref(), refed.as_ref()),
+        );
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
@@ -169,11 +194,29 @@ fn corrected(
     monitor: &dyn Monitor,
 ) -> Result<Option<correction::Corrected>, Failure> {
     let blank = job.stock.as_ref().zip(job.program_zero_z_mm);
-    match (job.mode.kind, job.holding(), blank, driven) {
+    match (job.mode.kind.compensates(), job.holding(), blank, driven) {
         // A program that does harm as it is gets no new one.
-        (ModeKind::Compensate, Some(holding), Some(blank), Some(driven)) if is_safe(driven.0, blank.0) => {
+        (true, Some(holding), Some(blank), Some(driven)) if is_safe(driven.0, blank.0) => {
             monitor.progress(0.7, Message::new("stage_correcting"));
             correction::corrected(program, job, &holding, blank, driven, monitor).map(Some)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// The program with the fastest feeds, where they are asked for.
+fn refed(
+    program: &reader::Program,
+    job: &Job,
+    driven: Option<(&stock::Turned, &yielding::Yielded)>,
+    monitor: &dyn Monitor,
+) -> Result<Option<refeed::Refed>, Failure> {
+    let blank = job.stock.as_ref().zip(job.program_zero_z_mm);
+    match (job.refeed.as_ref().filter(|_| job.mode.kind.refeeds()), job.holding(), blank, driven) {
+        (Some(bounds), Some(holding), Some(blank), Some((turned, before))) if is_safe(turned, blank.0) => {
+            monitor.progress(0.6, Message::new("stage_refeeding"));
+            let finishing = stock::lines_that_finish(turned);
+            refeed::refed(program, job, bounds, &holding, blank, (&finishing, before), monitor).map(Some)
         }
         _ => Ok(None),
     }
@@ -190,8 +233,11 @@ fn basis(job: &Job) -> Vec<Basis> {
     if job.stock.is_some() {
         used.push(Basis { equation: "program/3", source: "envelope of segments and arcs" });
     }
-    if job.mode.kind == ModeKind::Compensate {
+    if job.mode.kind.compensates() {
         used.push(Basis { equation: "program/5", source: "opening at the depth that is meant" });
+    }
+    if job.mode.kind.refeeds() {
+        used.push(Basis { equation: "program/8", source: "geometric program through what comes out of every line" });
     }
     if let Some(force) = &job.force {
         used.push(Basis { equation: "program/4", source: "cut along any direction, equilibrium at the engaged depth" });
@@ -219,6 +265,7 @@ const CODES: Codes = Codes {
         stock::FAILURE_CODES,
         yielding::FAILURE_CODES,
         correction::FAILURE_CODES,
+        refeed::FAILURE_CODES,
         &["no_program_returned"],
     ],
     warnings: &[
@@ -227,7 +274,14 @@ const CODES: Codes = Codes {
         &["unconfirmed_force_coefficient", "edge_angle_beyond_table"],
     ],
     explanations: &[advice::EXPLANATION_CODES],
-    stages: &[&["stage_reading", "stage_turning", "stage_yielding", "stage_correcting", "stage_done"]],
+    stages: &[&[
+        "stage_reading",
+        "stage_turning",
+        "stage_yielding",
+        "stage_refeeding",
+        "stage_correcting",
+        "stage_done",
+    ]],
     labels: &[picture::LABEL_CODES],
 };
 

@@ -9,13 +9,15 @@ use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::reader::{Kind, Nose, Program};
 use super::super::model::stock::{Doubt, Stroke, Turned, implausible_mm, strokes};
 use super::super::model::yielding::{PlaceOfMove, Yielded};
-use super::output::{CompensatedProgram, Outcome};
+use super::output::{CompensatedProgram, Outcome, RefedProgram};
 
 /// Rapid moves that are told.
 const MOST_RAPIDS: usize = 100;
 /// A thinner chip is none, and a nose that stands off by less is not told, mm.
 const CHIP_MM: f64 = 1e-3;
 const NOSE_MM: f64 = 5e-4;
+/// Feeds differ by a larger share.
+const SAME_FEED: f64 = 1e-9;
 /// Lines that one warning names.
 const MOST_LINES: usize = 20;
 
@@ -44,6 +46,8 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "program_off_drawing",
     "error_along_contour",
     "program_corrected",
+    "program_refed",
+    "refeed_price",
     "jumps_left_thick",
     "nothing_to_correct",
 ];
@@ -80,19 +84,41 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     }
     // What was asked for comes first.
     if let Some(compensation) = &outcome.compensation {
-        said.splice(0..0, of_compensation(outcome.lines, compensation));
+        said.splice(0..0, of_compensation(outcome, compensation));
+    }
+    if let Some(refeed) = &outcome.refeed {
+        said.splice(0..0, of_refeed(refeed));
     }
     said
 }
 
-fn of_compensation(lines: usize, compensation: &CompensatedProgram) -> Vec<Message> {
-    let Some(proof) = &compensation.proof else { return vec![Message::new("nothing_to_correct")] };
+/// The feeds, and what would buy more.
+fn of_refeed(refeed: &RefedProgram) -> Vec<Message> {
+    let feeds = refeed.feeds.old_feed_mm_per_rev.iter().zip(&refeed.feeds.new_feed_mm_per_rev);
+    let changed = feeds.filter(|(old, new)| (*old - *new).abs() > SAME_FEED * *old).count();
+    let refed = Message::new("program_refed")
+        .with("changed", changed)
+        .with("lines", refeed.feeds.line.len())
+        .with("before_min", refeed.cutting_time_before_min)
+        .with("after_min", refeed.cutting_time_after_min);
+    let price = refeed.prices.first().map(|price| {
+        Message::new("refeed_price").with("limit", price.constraint.clone()).with("gain_percent", price.gain_percent)
+    });
+    [Some(refed), price].into_iter().flatten().collect()
+}
+
+fn of_compensation(outcome: &Outcome, compensation: &CompensatedProgram) -> Vec<Message> {
+    let Some(proof) = &compensation.proof else {
+        let nothing = outcome.refeed.is_none().then(|| Message::new("nothing_to_correct"));
+        return nothing.into_iter().collect();
+    };
     let largest = |low: f64, high: f64| high.max(-low);
     let corrected = Message::new("program_corrected")
         .with("changed", compensation.lines_changed.len())
-        .with("lines", lines)
+        .with("lines", outcome.lines)
         .with("before_um", largest(proof.smallest_error_before_um, proof.largest_error_before_um))
         .with("after_um", largest(proof.smallest_error_after_um, proof.largest_error_after_um));
+    let corrected = if outcome.refeed.is_some() { corrected.with("refed", 1.0) } else { corrected };
     let thickest = compensation.transitions.iter().map(|one| one.leaves_um).reduce(f64::max);
     let thick = thickest.map(|leaves_um| {
         Message::new("jumps_left_thick").with("stretches", compensation.transitions.len()).with("leaves_um", leaves_um)

@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use crate::feed_schedule::stretches::PriceOfLimit;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::super::job::StockRow;
 use super::super::model::correction::{ChangedLine, Corrected, Proof, Transition as ThickStretch, WhyLeftAlone};
 use super::super::model::reader::{ContourCycle, Feed, Kind, Nose, Program, ProgramMove, Speed};
+use super::super::model::refeed::{LimitReached, Refed};
 use super::super::model::stock::{Curve, Part, Piece, Turned, lines_that_finish, outline};
-use super::super::model::yielding::{ContourError, CutPlace, Yielded, between, contour};
+use super::super::model::yielding::{ContourError, CutPlace, Yielded, between, contour as contour_of};
 
 /// What a program makes the machine do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -54,8 +56,140 @@ pub struct Outcome {
     pub drawing: Option<ProgramError>,
     /// What it leaves where work and machine yield; null without a force law.
     pub yielding: Option<YieldedWork>,
-    /// The program that leaves no error; null where it was not asked for.
+    /// The program that is given back, with its X, its feeds, or both changed; null where none was asked for.
     pub compensation: Option<CompensatedProgram>,
+    /// The feeds that it was given, why, and what they bring; null where they were not asked for.
+    pub refeed: Option<RefedProgram>,
+}
+
+/// The fastest feeds of a program within the limits of `refeed`, as the program that is given back keeps them when it is read and
+/// driven as one of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RefedProgram {
+    /// Time of all moves at the feed, as the program is.
+    #[schema(extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_before_min: f64,
+    /// The same at the new feeds.
+    #[schema(extensions(("x-unit" = json!("min"))))]
+    pub cutting_time_after_min: f64,
+    /// The lines that cut, in the order in which they first do, by columns.
+    pub feeds: RefedFeeds,
+    /// Lines that cut and keep their feed: it is one per minute at a constant cutting speed, or not one along the line.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub kept_lines: Vec<usize>,
+    /// What each number of `refeed` that binds costs, the most costly first.
+    pub prices: Vec<RefedPrice>,
+    /// The limits with the most that is reached of them at any place of the cut.
+    pub limits: Vec<RefedLimit>,
+    /// Lines that are as they were, before X is shifted.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub lines_compared: usize,
+    /// Moves that are no others than before but for their feed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub moves_compared: usize,
+}
+
+/// Lines that cut and their feeds, all of one length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RefedFeeds {
+    /// Line of the program, from 1.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Vec<usize>,
+    /// Place of the tool in `tools`, from 0.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub tool: Vec<Option<u32>>,
+    /// Whether it makes the surface that is left.
+    pub is_finishing: Vec<bool>,
+    /// Where its first move begins, from the headstock end.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_start_mm: Vec<f64>,
+    /// Where its last move ends.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_end_mm: Vec<f64>,
+    /// Length of its moves at the feed.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub length_mm: Vec<f64>,
+    /// Largest depth that it really cuts.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<f64>,
+    /// Feed as the program is.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub old_feed_mm_per_rev: Vec<f64>,
+    /// Feed of the program that is given back.
+    #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+    pub new_feed_mm_per_rev: Vec<f64>,
+    /// Limits that keep it from being faster, the most costly first.
+    pub binding: Vec<Vec<String>>,
+}
+
+/// A number of `refeed` that binds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RefedPrice {
+    /// The limit.
+    #[schema(example = "deflection")]
+    pub constraint: String,
+    /// The number, in the unit of its field.
+    #[schema(example = 10.0, extensions(("x-unit" = json!("as the field says"))))]
+    pub limit: f64,
+    /// What one percent looser takes off the time of the lines that cut.
+    #[schema(example = 0.34, extensions(("x-unit" = json!("percent"))))]
+    pub gain_percent: f64,
+}
+
+/// A limit and what is reached of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RefedLimit {
+    /// The limit.
+    #[schema(example = "deflection")]
+    pub constraint: String,
+    /// The limit, in the unit of its field.
+    #[schema(example = 10.0, extensions(("x-unit" = json!("as the field says"))))]
+    pub limit: f64,
+    /// The most that is reached of it.
+    #[schema(example = 9.98, extensions(("x-unit" = json!("as the field says"))))]
+    pub reached: f64,
+    /// Line in which it is, from 1; null where the limit is one of a tool.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub line: Option<usize>,
+}
+
+impl RefedProgram {
+    fn of(refed: &Refed) -> Self {
+        let mut feeds = RefedFeeds::default();
+        for one in &refed.stretches {
+            feeds.line.push(one.line);
+            feeds.tool.push(one.tool);
+            feeds.is_finishing.push(one.is_finishing);
+            feeds.z_start_mm.push(one.ends_mm[0]);
+            feeds.z_end_mm.push(one.ends_mm[1]);
+            feeds.length_mm.push(one.length_mm);
+            feeds.depth_mm.push(one.depth_mm);
+            feeds.old_feed_mm_per_rev.push(one.feeds_mm_per_rev[0]);
+            feeds.new_feed_mm_per_rev.push(one.feeds_mm_per_rev[1]);
+            feeds.binding.push(one.binding.clone());
+        }
+        let price = |one: &PriceOfLimit| RefedPrice {
+            constraint: one.constraint.clone(),
+            limit: one.limit,
+            gain_percent: one.gain_percent,
+        };
+        let limit = |one: &LimitReached| RefedLimit {
+            constraint: one.name.to_owned(),
+            limit: one.limit,
+            reached: one.reached,
+            line: one.line,
+        };
+        Self {
+            cutting_time_before_min: refed.time_min[0],
+            cutting_time_after_min: refed.time_min[1],
+            feeds,
+            kept_lines: refed.kept_lines.clone(),
+            prices: refed.prices.iter().map(price).collect(),
+            limits: refed.limits.iter().map(limit).collect(),
+            lines_compared: refed.lines_compared,
+            moves_compared: refed.moves_compared,
+        }
+    }
 }
 
 /// What a program leaves on work and machine that do not yield, against the part of the drawing, by columns.
@@ -93,7 +227,7 @@ impl ProgramError {
     }
 }
 
-/// A program whose finishing cuts are shifted against what they would leave.
+/// The program that is given back: its finishing cuts are shifted against what they would leave, or its feeds are others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CompensatedProgram {
     /// Lines of the given program that become others.
@@ -105,7 +239,7 @@ pub struct CompensatedProgram {
     pub left_alone: Vec<LineLeftAlone>,
     /// Stretches over which the work stays thick, because the shift jumps there and is laid on the side of the stock.
     pub transitions: Vec<Transition>,
-    /// What came of it when the program that is given back was read and driven again; null where nothing changes.
+    /// What came of the shifts when the program that is given back was read and driven again; null where nothing is shifted.
     pub proof: Option<CompensationProof>,
     /// The error that the program that is given back leaves along the contour, by columns; empty where nothing changes.
     pub contour: ErrorAlong,
@@ -199,7 +333,7 @@ pub struct CompensationProof {
 }
 
 impl CompensatedProgram {
-    fn of(corrected: &Corrected) -> Self {
+    fn of(corrected: &Corrected, refed: Option<&Refed>) -> Self {
         let change = |one: &ChangedLine| LineChange {
             line: one.line,
             old: one.old.clone(),
@@ -208,7 +342,12 @@ impl CompensatedProgram {
             largest_shift_um: one.largest_shift_um,
         };
         let mut contour = ErrorAlong::default();
-        corrected.proof.iter().flat_map(|proof| &proof.contour).for_each(|error| contour.push(error));
+        match (&corrected.proof, refed) {
+            (Some(proof), _) => proof.contour.iter().for_each(|error| contour.push(error)),
+            // What is not shifted leaves its error at the new feeds.
+            (None, Some(refed)) => contour_of(&refed.yielded).iter().for_each(|error| contour.push(error)),
+            (None, None) => {}
+        }
         let transition = |one: &ThickStretch| Transition {
             line: one.line,
             z_mm: one.from_mm,
@@ -337,7 +476,7 @@ const UM_PER_MM: f64 = 1e3;
 
 impl YieldedWork {
     fn of(yielded: &Yielded, finishing: &[usize]) -> Self {
-        let errors = contour(yielded);
+        let errors = contour_of(yielded);
         let ends = |errors: &mut dyn Iterator<Item = f64>| {
             errors.fold(None, |ends: Option<(f64, f64)>, error| {
                 Some(ends.map_or((error, error), |(low, high)| (low.min(error), high.max(error))))
@@ -498,7 +637,7 @@ impl ReadMoves {
     /// Adds a move. Feed and speed stand with moves that cut.
     fn push(&mut self, one: &ProgramMove) {
         let cuts = one.kind.is_feed();
-        let (per_rev, per_min) = match one.feed {
+        let (per_rev, per_min) = match one.feed.filter(|_| cuts) {
             Some(Feed::PerRev(feed)) => (Some(feed), None),
             Some(Feed::PerMinute(feed)) => (None, Some(feed)),
             None => (None, None),
@@ -584,9 +723,8 @@ impl Path {
 pub(crate) fn outcome(
     program: &Program,
     drawing: &[StockRow],
-    turned: Option<&Turned>,
-    yielded: Option<&Yielded>,
-    corrected: Option<&Corrected>,
+    (turned, yielded): (Option<&Turned>, Option<&Yielded>),
+    (corrected, refed): (Option<&Corrected>, Option<&Refed>),
 ) -> Outcome {
     let finishing = turned.map(lines_that_finish).unwrap_or_default();
     let mut moves = ReadMoves::default();
@@ -604,6 +742,7 @@ pub(crate) fn outcome(
         surface: turned.map(LeftSurface::of),
         drawing: turned.and_then(|turned| ProgramError::of(turned, drawing)),
         yielding: yielded.map(|yielded| YieldedWork::of(yielded, &finishing)),
-        compensation: corrected.map(CompensatedProgram::of),
+        compensation: corrected.map(|corrected| CompensatedProgram::of(corrected, refed)),
+        refeed: refed.map(RefedProgram::of),
     }
 }

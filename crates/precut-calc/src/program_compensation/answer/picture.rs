@@ -6,10 +6,10 @@ use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role,
 
 use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
-use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, YieldedWork};
+use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, RefedFeeds, YieldedWork};
 
 pub(crate) const FIGURE_IDS: &[&str] = &["program"];
-pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes"];
+pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes", "feeds"];
 
 /// Codes of titles, axes and legends.
 pub(crate) const LABEL_CODES: &[&str] = &[
@@ -24,6 +24,9 @@ pub(crate) const LABEL_CODES: &[&str] = &[
     "error_of_diameter",
     "error_as_programmed",
     "error_as_corrected",
+    "feed_of_lines",
+    "feed_as_programmed",
+    "feed_as_given_back",
 ];
 
 /// Chords of a quarter in the picture.
@@ -49,6 +52,12 @@ pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         let after = after.map(|along| error_along("error_as_corrected", along, zero_mm, Role::After));
         let items = [before].into_iter().chain(after).collect();
         panels.push(panel(Axis::linear("error_of_diameter", "um"), 2.0, items));
+    }
+    if let Some(refeed) = &outcome.refeed {
+        let feeds = &refeed.feeds;
+        let before = feeds_along("feed_as_programmed", feeds, &feeds.old_feed_mm_per_rev, zero_mm, Role::Before);
+        let after = feeds_along("feed_as_given_back", feeds, &feeds.new_feed_mm_per_rev, zero_mm, Role::After);
+        panels.push(panel(Axis::linear("feed_of_lines", "mm/rev"), 2.0, vec![before, after]));
     }
     panels.retain(|panel| !panel.items.is_empty());
     let program = Figure {
@@ -89,6 +98,20 @@ fn error_along(name: &'static str, along: &ErrorAlong, zero_mm: f64, role: Role)
         }
         x.push(z);
         y.push(Some(error));
+    }
+    Item::Line { name, x, y, role }
+}
+
+/// Feeds over the stretches of their lines, with gaps between them.
+fn feeds_along(name: &'static str, feeds: &RefedFeeds, values: &[f64], zero_mm: f64, role: Role) -> Item {
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    for (i, &value) in values.iter().enumerate() {
+        if i > 0 {
+            x.push(feeds.z_start_mm[i] - zero_mm);
+            y.push(None);
+        }
+        x.extend([feeds.z_start_mm[i] - zero_mm, feeds.z_end_mm[i] - zero_mm]);
+        y.extend([Some(value); 2]);
     }
     Item::Line { name, x, y, role }
 }
@@ -241,6 +264,20 @@ pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
     }
     if let Some(compensation) = outcome.compensation.as_ref().filter(|one| !one.changes.is_empty()) {
         found.push(changes(compensation));
+    }
+    if let Some(refeed) = &outcome.refeed {
+        let feeds = &refeed.feeds;
+        let lines: Vec<f64> = feeds.line.iter().map(|&line| line as f64).collect();
+        found.push(Table {
+            id: "feeds",
+            columns: vec![
+                Column::numbers("line", "1", &lines),
+                Column::numbers("depth", "mm", &feeds.depth_mm),
+                Column::numbers("old_feed", "mm/rev", &feeds.old_feed_mm_per_rev),
+                Column::numbers("new_feed", "mm/rev", &feeds.new_feed_mm_per_rev),
+                Column::words("binding", feeds.binding.iter().map(|names| names.join(" ").into()).collect()),
+            ],
+        });
     }
     found
 }

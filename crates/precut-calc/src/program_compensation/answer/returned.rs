@@ -17,7 +17,8 @@ pub(crate) fn returned(job: &Job, compensation: &CompensatedProgram, made_by: &s
     let (mut text, mut diff) = (compensation.nc_program.clone(), compensation.diff.clone());
     // What comes back as it was has nothing to say.
     if job.mode.stamp && !compensation.changes.is_empty() {
-        let stamp = stamp(job.dialect, &compensation.changes, made_by);
+        let does = if job.mode.kind.refeeds() { "changes feeds and shifts X" } else { "shifts X" };
+        let stamp = stamp(job.dialect, &compensation.changes, (made_by, does));
         let (line, end) = head(&job.nc_program, job.dialect);
         text = stamped(&text, line, end, &stamp);
         diff = unified(&job.nc_program, &with_stamp(&job.nc_program, &compensation.changes, line, &stamp));
@@ -26,10 +27,10 @@ pub(crate) fn returned(job: &Job, compensation: &CompensatedProgram, made_by: &s
 }
 
 /// The comment.
-fn stamp(dialect: Dialect, changes: &[LineChange], made_by: &str) -> String {
+fn stamp(dialect: Dialect, changes: &[LineChange], (made_by, does): (&str, &str)) -> String {
     let largest = |change: &LineChange| change.smallest_shift_um.abs().max(change.largest_shift_um.abs());
     let shift_um = changes.iter().map(largest).fold(0.0, f64::max);
-    let said = format!("{made_by} shifts X by up to {shift_um:.0} um in {} lines", changes.len());
+    let said = format!("{made_by} {does} by up to {shift_um:.0} um in {} lines", changes.len());
     // Nothing in a comment acts, whatever names the answer.
     let plain = said.chars().map(|c| if c.is_ascii_alphanumeric() || " .,:-_".contains(c) { c } else { ' ' });
     let plain: String = plain.take(LONGEST).collect();
@@ -116,6 +117,9 @@ mod tests {
 
     #[test]
     fn nothing_in_the_comment_acts() {
-        assert_eq!(stamp(Dialect::Fanuc, &[], "a) G0 (b;\n%"), "(a  G0  b    shifts X by up to 0 um in 0 lines)");
+        assert_eq!(
+            stamp(Dialect::Fanuc, &[], ("a) G0 (b;\n%", "shifts X")),
+            "(a  G0  b    shifts X by up to 0 um in 0 lines)"
+        );
     }
 }

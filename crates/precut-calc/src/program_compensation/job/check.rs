@@ -1,6 +1,7 @@
 //! Rules between fields. What is wrong in the program itself is told by its reader.
 
 use crate::calculator::{Check, Finding, Violations};
+use crate::machinability::ModelForm;
 use crate::material;
 
 use super::input::{Job, ModeKind};
@@ -16,6 +17,11 @@ pub(crate) const CODES: &[&str] = &[
     "tip_not_outside",
     "force_without_stock",
     "compensation_without_force",
+    "refeed_missing",
+    "refeed_limits_cross",
+    "refeed_needs_model",
+    "refeed_needs_power_law",
+    "refeed_needs_main_force",
     "keep_out_without_length",
     "keep_out_without_stock",
     "drawing_without_stock",
@@ -35,6 +41,7 @@ impl Check for Job {
         }
         self.check_tools(violations);
         self.check_holding(violations);
+        self.check_refeed(violations);
         for (i, keep_out) in self.keep_out.iter().enumerate() {
             violations.require(keep_out.z_start_mm < keep_out.z_end_mm, || {
                 Finding::new("keep_out_without_length", format!("/keep_out/{i}/z_end_mm"))
@@ -84,9 +91,8 @@ impl Job {
             });
         }
         if self.force.is_none() {
-            return violations.require(self.mode.kind != ModeKind::Compensate, || {
-                Finding::new("compensation_without_force", "/force")
-            });
+            return violations
+                .require(self.mode.kind == ModeKind::Read, || Finding::new("compensation_without_force", "/force"));
         }
         let Some(stock) = &self.stock else {
             return violations.add(Finding::new("force_without_stock", "/stock"));
@@ -111,6 +117,33 @@ impl Job {
         if let Some(holding) = self.holding() {
             holding.check(violations);
         }
+    }
+
+    /// What new feeds ask for.
+    fn check_refeed(&self, violations: &mut Violations) {
+        let Some(refeed) = &self.refeed else {
+            return violations.require(!self.mode.kind.refeeds(), || Finding::new("refeed_missing", "/refeed"));
+        };
+        let (low, high) = (refeed.feed_min_mm_per_rev, refeed.feed_max_mm_per_rev);
+        violations.require(low < high, || {
+            Finding::new("refeed_limits_cross", "/refeed/feed_max_mm_per_rev")
+                .measured(high, low, "mm/rev")
+                .with("above", low)
+        });
+        for (limit, model, field, by) in [
+            (refeed.roughness_max_um, &refeed.roughness, "roughness", "roughness_max_um"),
+            (refeed.tool_usage_max, &refeed.tool_life, "tool_life", "tool_usage_max"),
+        ] {
+            violations.require(limit.is_none() || model.is_some(), || {
+                Finding::new("refeed_needs_model", format!("/refeed/{field}")).with("needed_by", by)
+            });
+        }
+        violations.require(refeed.tool_life.as_ref().is_none_or(|life| life.form == ModelForm::LogLog), || {
+            Finding::new("refeed_needs_power_law", "/refeed/tool_life/form")
+        });
+        let main = refeed.force_z_max_n.or(refeed.power_kw).or(refeed.torque_n_m);
+        let has_main = self.force.as_ref().is_none_or(crate::force::ForceModel::has_main);
+        violations.require(main.is_none() || has_main, || Finding::new("refeed_needs_main_force", "/force"));
     }
 
     fn check_tools(&self, violations: &mut Violations) {

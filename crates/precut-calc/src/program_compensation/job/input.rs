@@ -7,6 +7,7 @@ use crate::calculator::{Dialect, ProgramEncoding};
 use crate::deflection_compensation::{Carriage, Gravity, Holding, Segment, Shaft, Support, Theory};
 use crate::effects::{DeflectionConditions, DeflectionEffect};
 use crate::force::ForceModel;
+use crate::machinability::MachinabilityModel;
 
 /// A program for a lathe, and what is asked of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -42,6 +43,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 100, extensions(("x-group" = json!("cut"))))]
     pub tools: Vec<ProgramTool>,
+    /// What the feeds are bounded by that the modes `refeed` and `both` write.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("limits"))))]
+    pub refeed: Option<Refeed>,
     /// How cutting forces follow from depth, feed and speed. With it the answer says what the program leaves where work and
     /// machine yield. Nose and edge of Kienzle's law are those of the tool that cuts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -434,4 +439,78 @@ pub enum ModeKind {
     Read,
     /// X of its finishing cuts is shifted so that the error is gone; nothing else changes.
     Compensate,
+    /// Its feeds become the fastest within `refeed`; nothing else changes.
+    Refeed,
+    /// First the feeds, then X at the new feeds.
+    Both,
+}
+
+impl ModeKind {
+    /// Whether X is shifted.
+    pub(crate) fn compensates(self) -> bool {
+        matches!(self, Self::Compensate | Self::Both)
+    }
+
+    /// Whether feeds change.
+    pub(crate) fn refeeds(self) -> bool {
+        matches!(self, Self::Refeed | Self::Both)
+    }
+}
+
+/// Limits of the feeds of a program. What is left out does not limit. Speeds stay as they are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(as = ProgramRefeed)]
+pub struct Refeed {
+    /// Least feed.
+    #[schema(minimum = 1e-3, maximum = 20.0, example = 0.05, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_min"))))]
+    pub feed_min_mm_per_rev: f64,
+    /// Largest feed.
+    #[schema(minimum = 1e-3, maximum = 20.0, example = 0.4, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_max"))))]
+    pub feed_max_mm_per_rev: f64,
+    /// Largest ratio of the feeds of lines that follow each other in the cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 1.0, maximum = 1e6, example = 1.25, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho_S")), ("x-advanced" = json!(true))))]
+    pub feed_step_ratio_max: Option<f64>,
+    /// By how much the tool may come to stand off its path along the axis, on lines that finish; the diameter is off by twice that.
+    /// In mode `both` that is before X is shifted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1e6, example = 10.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("delta_max"))))]
+    pub deflection_max_um: Option<f64>,
+    /// Largest roughness of lines that finish, in the measure of `roughness`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-4, maximum = 1e6, example = 3.2, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("Ra_max"))))]
+    pub roughness_max_um: Option<f64>,
+    /// Model of the roughness, um; needed with its limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-advanced" = json!(true))))]
+    pub roughness: Option<MachinabilityModel>,
+    /// Largest passive force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e9, example = 600.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("P_y"))))]
+    pub force_y_max_n: Option<f64>,
+    /// Largest main force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e9, example = 1500.0, extensions(("x-unit" = json!("N")), ("x-symbol" = json!("P_z"))))]
+    pub force_z_max_n: Option<f64>,
+    /// Power of the motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 10_000.0, example = 10.0, extensions(("x-unit" = json!("kW")), ("x-symbol" = json!("P_max"))))]
+    pub power_kw: Option<f64>,
+    /// Share of the motor's power that reaches the cut.
+    #[serde(default = "one")]
+    #[schema(exclusive_minimum = 0.0, maximum = 1.0, default = 1.0, example = 0.8, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("eta"))))]
+    pub efficiency: f64,
+    /// Torque at the spindle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-3, maximum = 1e7, example = 400.0, extensions(("x-unit" = json!("N m")), ("x-symbol" = json!("M_max"))))]
+    pub torque_n_m: Option<f64>,
+    /// Share of an edge that the lines of one tool may use per part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1e-6, maximum = 1e6, example = 1.0, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("U_max"))))]
+    pub tool_usage_max: Option<f64>,
+    /// Model of the tool life, min, a power law; needed with the limit of its usage.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-advanced" = json!(true))))]
+    pub tool_life: Option<MachinabilityModel>,
 }

@@ -7,5 +7,5 @@ pub use crate::calculator::Dialect;
 pub(super) use check::CODES;
 pub use input::{
     DecimalPoint, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
-    ProgramUnits, Reading, StockRow, SupportLines, WordsOfX,
+    ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };

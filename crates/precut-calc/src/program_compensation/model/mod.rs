@@ -2,5 +2,6 @@
 
 pub(super) mod correction;
 pub(super) mod reader;
+pub(super) mod refeed;
 pub(super) mod stock;
 pub(super) mod yielding;

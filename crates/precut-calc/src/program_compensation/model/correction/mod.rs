@@ -29,8 +29,8 @@ pub(crate) use plan::LeftAlone;
 pub use plan::WhyLeftAlone;
 pub(crate) use proof::{FAILURE_CODES, Proof, Transition};
 use proof::{Failed, Task};
-pub(crate) use rewrite::ChangedLine;
 use rewrite::Written;
+pub(crate) use rewrite::{ChangedLine, applied, decimal, number_like};
 
 /// How often jumps of the shift are laid over twice the stretch because the work came out thin beside them.
 const MOST_TRIALS: usize = 3;

@@ -145,7 +145,7 @@ impl Written {
 }
 
 /// The text with lines replaced, each with its own line end.
-fn applied(text: &str, lines: &[Range<usize>], changed: &[ChangedLine]) -> String {
+pub(crate) fn applied(text: &str, lines: &[Range<usize>], changed: &[ChangedLine]) -> String {
     let mut out = String::with_capacity(text.len() + 64 * changed.len());
     let mut at = 0;
     for one in changed {
@@ -441,34 +441,38 @@ impl Line<'_> {
 
     /// A number in the form of the one that it replaces.
     fn number(&self, length_mm: f64, old: &NumberInText) -> String {
-        let before = &self.text[old.range.clone()];
-        if let Some(step_mm) = old.step_mm {
-            let steps = length_mm / step_mm;
-            if (steps - steps.round()).abs() < 1e-6 {
-                return format!("{:.0}", steps.round() + 0.0);
-            }
-        }
-        let value = length_mm / old.unit_mm;
-        let mut number = decimal(value, self.step);
-        // As many decimals as there were.
-        if let Some((_, decimals)) = before.split_once('.') {
-            let kept = decimals.chars().filter(char::is_ascii_digit).count();
-            let now = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-            number.extend(std::iter::repeat_n('0', kept.saturating_sub(now)));
-        }
-        let bare = before.trim_start_matches(['+', '-']);
-        if bare.starts_with('.') {
-            number = number.replacen("0.", ".", 1);
-        }
-        if before.starts_with('+') && !number.starts_with('-') {
-            number.insert(0, '+');
-        }
-        number
+        number_like(&self.text[old.range.clone()], length_mm, old, self.step)
     }
 }
 
+/// A number in the form of the one that it replaces, with no more decimals than a step has or it had.
+pub(crate) fn number_like(before: &str, length_mm: f64, old: &NumberInText, step: f64) -> String {
+    if let Some(step_mm) = old.step_mm {
+        let steps = length_mm / step_mm;
+        if (steps - steps.round()).abs() < 1e-6 {
+            return format!("{:.0}", steps.round() + 0.0);
+        }
+    }
+    let value = length_mm / old.unit_mm;
+    let mut number = decimal(value, step);
+    // As many decimals as there were.
+    if let Some((_, decimals)) = before.split_once('.') {
+        let kept = decimals.chars().filter(char::is_ascii_digit).count();
+        let now = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        number.extend(std::iter::repeat_n('0', kept.saturating_sub(now)));
+    }
+    let bare = before.trim_start_matches(['+', '-']);
+    if bare.starts_with('.') {
+        number = number.replacen("0.", ".", 1);
+    }
+    if before.starts_with('+') && !number.starts_with('-') {
+        number.insert(0, '+');
+    }
+    number
+}
+
 /// A number with a decimal point and no more decimals than it needs.
-pub(super) fn decimal(value: f64, step: f64) -> String {
+pub(crate) fn decimal(value: f64, step: f64) -> String {
     // A step has six decimals at the most.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let decimals = (-step.log10() - 1e-9).ceil().clamp(1.0, 6.0) as usize;

@@ -388,7 +388,7 @@ impl<'a> Reader<'a> {
             }
             return;
         }
-        let Some(word) = words.take(b'F') else { return };
+        let Some(word) = words.take(b'F') else { return self.keep_feed(words, None) };
         let unit = if self.state.feed_inch { INCH_MM } else { 1.0 };
         let Operand::Number(number) = word.operand else {
             return self.notes.fault(word.spot, "word_without_number");
@@ -405,6 +405,7 @@ impl<'a> Reader<'a> {
             }
             _ => 1.0,
         };
+        self.keep_feed(words, Some((word, step)));
         let feed = number.value * step * unit;
         self.state.feed = Some(if self.state.per_minute { Feed::PerMinute(feed) } else { Feed::PerRev(feed) });
     }

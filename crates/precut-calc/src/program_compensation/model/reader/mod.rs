@@ -33,7 +33,7 @@ pub(crate) use arcs::centre_of_short_arc;
 pub(crate) use lines::lines as lines_of_text;
 pub use moves::{ContourCycle, CycleKind, Kind, Nose};
 pub(crate) use moves::{Feed, Move as ProgramMove, Speed};
-pub(crate) use words_of_line::{Call, NumberInText, WordsOfLine};
+pub(crate) use words_of_line::{Call, FeedOfLine, NumberInText, WordsOfLine};
 
 /// Most lines of a program.
 pub const MAX_LINES: usize = 200_000;
@@ -117,6 +117,8 @@ pub(crate) struct Program {
     pub(crate) cycles: Vec<ContourCycle>,
     /// The words of the lines that make one move along a path; none of a line that makes several.
     pub(crate) words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
+    /// Where lines say their feed.
+    pub(crate) feeds_of_lines: BTreeMap<usize, FeedOfLine>,
     /// The single cycles and finishing cycles, in the order of execution.
     pub(crate) calls: Vec<Call>,
     /// What is to be said of it.
@@ -157,6 +159,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         tools: Vec::new(),
         cycles: Vec::new(),
         words_of_lines: BTreeMap::new(),
+        feeds_of_lines: BTreeMap::new(),
         calls: Vec::new(),
         numbers: None,
         contour: None,
@@ -168,7 +171,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         unknown_functions: Vec::new(),
     };
     reader.run(monitor)?;
-    let Reader { mut notes, moves, tools, cycles, words_of_lines, calls, .. } = reader;
+    let Reader { mut notes, moves, tools, cycles, words_of_lines, feeds_of_lines, calls, .. } = reader;
     if notes.count() == 0 && moves.is_empty() {
         notes.fault(Spot { line: 1, column: 1, word: "" }, "nothing_in_program");
     }
@@ -176,7 +179,7 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
         return Err(refused_with(notes, hints::other_dialect(text, &lines, dialect)));
     }
     let (_, _, warnings) = notes.into_parts();
-    Ok(Program { lines: lines.len(), moves, tools, cycles, words_of_lines, calls, warnings })
+    Ok(Program { lines: lines.len(), moves, tools, cycles, words_of_lines, feeds_of_lines, calls, warnings })
 }
 
 impl Program {
@@ -212,6 +215,7 @@ struct Reader<'a> {
     tools: Vec<String>,
     cycles: Vec<ContourCycle>,
     words_of_lines: BTreeMap<usize, Option<WordsOfLine>>,
+    feeds_of_lines: BTreeMap<usize, FeedOfLine>,
     calls: Vec<Call>,
     /// Lines by the numbers of their blocks, once they are asked for.
     numbers: Option<Vec<(u64, usize)>>,
@@ -287,7 +291,8 @@ impl<'a> Reader<'a> {
     /// A move from where the tool is, which is then at its end.
     fn go(&mut self, line: usize, kind: Kind, end: Place, centre: Option<[f64; 2]>) {
         let state = &self.state;
-        let feed = if kind.is_feed() { state.feed } else { None };
+        // A cycle that is passed cuts at the feed as well.
+        let feed = if kind.is_feed() || kind == Kind::Opaque { state.feed } else { None };
         self.moves.push(Move {
             line,
             kind,

@@ -121,7 +121,7 @@ pub(crate) struct Move {
     pub(crate) end: Place,
     /// Centre of an arc: diameter and z, mm.
     pub(crate) centre: Option<[f64; 2]>,
-    /// Feed of a move that cuts.
+    /// Feed of a move that cuts, and of a cycle that is passed.
     pub(crate) feed: Option<Feed>,
     /// Speed, where one is set.
     pub(crate) speed: Option<Speed>,

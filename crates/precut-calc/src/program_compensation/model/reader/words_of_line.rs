@@ -68,6 +68,17 @@ pub(crate) struct Call {
     pub(crate) is_plain: bool,
 }
 
+/// Where a line says its feed, or would.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FeedOfLine {
+    /// Its number; none where the line says none.
+    pub(crate) number: Option<NumberInText>,
+    /// Where a word of the feed is put in: behind its last word.
+    pub(crate) put_in_at: usize,
+    /// What one of a feed is, mm.
+    pub(crate) unit_mm: f64,
+}
+
 /// What a number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Axis {
@@ -124,6 +135,17 @@ impl<'a> Reader<'a> {
         self.words_of_lines.insert(line, Some(kept));
     }
 
+    /// Keeps where a line says the feed, or may: not the pitch of a thread, nor a time.
+    pub(super) fn keep_feed(&mut self, words: &Words<'_, 'a>, word: Option<(Word<'a>, f64)>) {
+        let Some(put_in_at) = words.block.words.iter().map(|word| self.range_of(*word).end).max() else { return };
+        let unit_mm = if self.state.feed_inch { INCH_MM } else { 1.0 };
+        let number = word.and_then(|(word, step)| {
+            let step_mm = (step < 1.0).then_some(step);
+            Some(NumberInText { range: self.range_of_number(word)?, is_relative: false, unit_mm, step_mm })
+        });
+        self.feeds_of_lines.insert(words.block.line, FeedOfLine { number, put_in_at, unit_mm });
+    }
+
     /// Keeps a cycle whose moves have just been made, from the first one on.
     pub(super) fn keep_call(
         &mut self,
@@ -159,6 +181,18 @@ impl<'a> Reader<'a> {
         from..from + word.spot.word.len()
     }
 
+    /// The bytes of the number of a word.
+    fn range_of_number(&self, word: Word<'a>) -> Option<Range<usize>> {
+        let text = word.spot.word;
+        // Behind an equals sign, where there is one: what stands before it is an index.
+        let head = text.find('=').unwrap_or(1);
+        let is_of_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-');
+        let from = head + text.get(head..)?.find(is_of_number)?;
+        let to = text.rfind(|c: char| c.is_ascii_digit() || c == '.')? + 1;
+        let start = self.offset(text);
+        Some(start + from..start + to)
+    }
+
     fn number_of(&self, word: Word<'a>, axis: Axis) -> Option<NumberInText> {
         let (number, is_relative) = match word.operand {
             Operand::Number(number) => {
@@ -170,19 +204,13 @@ impl<'a> Reader<'a> {
             Operand::Absolute(number) => (number, false),
             _ => return None,
         };
-        let text = word.spot.word;
-        // Behind an equals sign, where there is one: what stands before it is an index.
-        let head = text.find('=').unwrap_or(1);
-        let is_of_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | '-');
-        let from = head + text.get(head..)?.find(is_of_number)?;
-        let to = text.rfind(|c: char| c.is_ascii_digit() || c == '.')? + 1;
-        let start = self.offset(text);
+        let range = self.range_of_number(word)?;
         let unit = if self.state.inch { INCH_MM } else { 1.0 };
         let factor = if axis == Axis::X { self.state.to_diameter(is_relative) } else { 1.0 };
         let as_increments = self.is_fanuc() && self.reading.decimal_point == Some(DecimalPoint::AsIncrements);
         let step = if self.state.inch { 0.1 } else { 1.0 } * self.reading.increment_um * 1e-3;
         Some(NumberInText {
-            range: start + from..start + to,
+            range,
             is_relative,
             unit_mm: unit * factor,
             step_mm: (as_increments && !number.has_point).then_some(step * unit * factor),

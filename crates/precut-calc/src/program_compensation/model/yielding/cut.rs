@@ -44,6 +44,26 @@ pub(crate) struct CutPlace {
     /// Beside corrected moves, at the ends of a move and where it cuts nothing: how far the tool may be set in there without
     /// touching what is left, mm.
     pub(crate) clear_mm: f64,
+    /// What the cut asks of machine and edge, where that is wanted and anything is cut.
+    pub(crate) load: Option<Load>,
+}
+
+/// What a cut asks of machine and edge at a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Load {
+    pub(crate) feed_mm_per_rev: f64,
+    pub(crate) rpm: f64,
+    /// Radius at which the outline leaves the stock, mm.
+    pub(crate) outer_radius_mm: f64,
+    pub(crate) passive_n: f64,
+    pub(crate) main_n: f64,
+}
+
+impl Load {
+    /// Cutting speed, m/min.
+    pub(crate) fn speed_m_per_min(&self) -> f64 {
+        2.0 * std::f64::consts::PI * self.outer_radius_mm.max(AXIS_MM) * self.rpm / 1000.0
+    }
 }
 
 /// Feed and speed of a move, as far as the program says them.
@@ -75,11 +95,14 @@ impl Pace {
 }
 
 /// A move that cuts, with all that its places have in common.
+#[allow(clippy::struct_excessive_bools)] // each is a fact of its own
 pub(crate) struct Cutting<'a> {
     pub(crate) stroke: &'a Stroke<'a>,
     pub(crate) held: &'a Held,
     pub(crate) force: &'a ForceModel,
     pub(crate) with_main: bool,
+    /// Whether it is told what the cut asks of machine and edge.
+    pub(crate) with_loads: bool,
     /// The work before the move: as it would be, did nothing yield, and as it is.
     pub(crate) nominal: &'a Chain,
     pub(crate) real: &'a Chain,
@@ -118,6 +141,13 @@ impl Law<'_> {
 }
 
 impl Loaded<'_> {
+    fn load(&self, engaged: Engaged, feed_mm_per_rev: f64, rpm: f64) -> Load {
+        let law = self.law.at(engaged.outer_radius_mm);
+        let force = |component| law.component_and_slope(component, engaged.depth_mm).0;
+        let (passive_n, main_n) = (force(Component::Passive).abs(), force(Component::Main));
+        Load { feed_mm_per_rev, rpm, outer_radius_mm: engaged.outer_radius_mm, passive_n, main_n }
+    }
+
     fn push(&self, engaged: Engaged) -> Push {
         if engaged.depth_mm <= 0.0 {
             return Push::default();
@@ -193,6 +223,7 @@ impl Cutting<'_> {
             radial_force_n: 0.0,
             lift_mm: lift_mm(radius_mm, gaps.opening(place, Push::default())),
             clear_mm: 0.0,
+            load: None,
         };
         let pace = Pace { feed: self.stroke.one.feed, speed: self.stroke.one.speed };
         let (Some(outline), Some(feed_mm_per_rev)) = (self.outline(share), pace.feed_mm_per_rev(radius_mm)) else {
@@ -215,7 +246,12 @@ impl Cutting<'_> {
             (lift_mm(radius_mm, gaps.opening(place, push)), engaged.depth_mm, push.radial_n)
         };
         let (lift_mm, depth_mm, radial_force_n) = if self.is_corrected { at(0.0) } else { equilibrium(at) };
-        CutPlace { nominal_depth_mm, depth_mm, lead_rad: outline.lead, radial_force_n, lift_mm, ..still }
+        let load = (self.with_loads && depth_mm > 0.0).then(|| {
+            let lift = if self.is_corrected { 0.0 } else { lift_mm };
+            let engaged = outline.engaged(self.real, [met_z_mm, met_radius_mm + lift]);
+            loaded.load(engaged, feed_mm_per_rev, rpm)
+        });
+        CutPlace { load, nominal_depth_mm, depth_mm, lead_rad: outline.lead, radial_force_n, lift_mm, ..still }
     }
 }
 

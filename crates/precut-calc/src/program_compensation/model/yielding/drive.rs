@@ -186,6 +186,7 @@ pub(crate) fn yielding(
             held: &held,
             force: &holding.force,
             with_main: holding.tangential,
+            with_loads: job.mode.kind.refeeds(),
             nominal: &meant.before,
             real: &real,
             goes_on: last_cut == stroke.index.checked_sub(1),

@@ -11,5 +11,5 @@ mod outline;
 mod sections;
 
 pub(crate) use contour::{ContourError, between, contour};
-pub(crate) use cut::{AXIS_MM, CutPlace, Pace};
+pub(crate) use cut::{AXIS_MM, CutPlace, Load, Pace};
 pub(crate) use drive::{Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};
