@@ -29,6 +29,8 @@ const SETTLED: f64 = 2e-5;
 /// How often feeds in whole steps are lowered, and the usage of an edge is asked to be less.
 const MOST_STEPS: usize = 60;
 const MOST_USAGES: usize = 6;
+/// Of more lines not each is tried by itself.
+const MOST_TRIED: usize = 40;
 /// How much less, beside what it is over.
 const LESS_USAGE: f64 = 0.999;
 /// Above a limit by a smaller share is none.
@@ -219,7 +221,7 @@ impl Task<'_> {
         let mut reached = self.reached(before);
         for _ in 0..MOST_USAGES {
             let (exact, scheduled, last) = self.scheduled(&bounds, feeds, reached)?;
-            let steps = self.in_steps(&exact, &scheduled)?;
+            let (steps, binding) = self.in_steps(&exact, &scheduled)?;
             let rounded = self.feeds(&steps);
             let now = self.drive(&rounded)?;
             // Slower is not always better for an edge.
@@ -227,7 +229,7 @@ impl Task<'_> {
                 (Some(most), Some(usage)) if usage > most * (1.0 + KEPT) => {
                     bounds.tool_usage_max = bounds.tool_usage_max.map(|asked| asked * most / usage * LESS_USAGE);
                 }
-                _ => return Ok((steps, scheduled)),
+                _ => return Ok((steps, Scheduled { binding, ..scheduled })),
             }
             (feeds, reached) = (exact, last);
         }
@@ -283,8 +285,8 @@ impl Task<'_> {
         }
     }
 
-    /// Whole steps: down to what is allowed, then up where one more still is.
-    fn in_steps(&self, feeds: &[f64], scheduled: &Scheduled) -> Result<Vec<f64>, Failure> {
+    /// Whole steps: down to what is allowed, then up as far as that still is; what stops each line.
+    fn in_steps(&self, feeds: &[f64], scheduled: &Scheduled) -> Result<(Vec<f64>, Vec<Vec<String>>), Failure> {
         let [low, high] = [self.refeed.feed_min_mm_per_rev, self.refeed.feed_max_mm_per_rev];
         let least = |line: &CuttingLine| (low / line.step_mm_per_rev * (1.0 - KEPT)).ceil();
         let most = |line: &CuttingLine| (high / line.step_mm_per_rev * (1.0 + KEPT)).floor();
@@ -296,7 +298,7 @@ impl Task<'_> {
             let now = self.feeds(&steps);
             let above = self.above(&self.drive(&now)?, &now);
             if above.is_empty() {
-                return self.one_more(steps, scheduled, most);
+                return self.raised(steps, scheduled, most);
             }
             for at in above {
                 if steps[at] - 1.0 < least(&self.lines[at]) {
@@ -308,58 +310,95 @@ impl Task<'_> {
         Err(self.not_settled(0))
     }
 
-    /// One step more where a limit of its own binds a line and still holds then.
-    fn one_more(
+    /// Steps as far up as they hold, and what stops each line: many lines by more and more steps at once, then each by itself.
+    fn raised(
         &self,
-        steps: Vec<f64>,
+        mut steps: Vec<f64>,
         scheduled: &Scheduled,
         most: impl Fn(&CuttingLine) -> f64,
-    ) -> Result<Vec<f64>, Failure> {
-        let is_bound = |i: usize| scheduled.binding[i].iter().any(|name| name != "feed_max" && name != "feed_min");
-        let may = |i: usize| is_bound(i) && steps[i] + 1.0 <= most(&self.lines[i]);
-        let tried: Vec<f64> = (0..steps.len()).map(|i| steps[i] + if may(i) { 1.0 } else { 0.0 }).collect();
-        let feeds = self.feeds(&tried);
-        let reached = self.drive(&feeds)?;
-        let above = self.above(&reached, &feeds);
-        let is_used_up = |reached: &[Reached]| {
-            self.refeed.tool_usage_max.zip(self.largest_usage(reached)).is_some_and(|(most, usage)| usage > most)
-        };
-        if is_used_up(&reached) {
-            return Ok(steps);
+    ) -> Result<(Vec<f64>, Vec<Vec<String>>), Failure> {
+        let most: Vec<f64> = self.lines.iter().map(most).collect();
+        let mut more = vec![1.0; steps.len()];
+        for _ in 0..MOST_STEPS {
+            let tried: Vec<f64> = (0..steps.len()).map(|i| (steps[i] + more[i]).min(most[i])).collect();
+            if tried == steps {
+                break;
+            }
+            let passed = self.passed_at(&tried)?;
+            let kept: Vec<f64> =
+                (0..steps.len()).map(|i| if passed[i].is_empty() { tried[i] } else { steps[i] }).collect();
+            let holds = kept == tried || (kept != steps && self.passed_at(&kept)?.iter().all(Vec::is_empty));
+            for (more, passed) in more.iter_mut().zip(&passed) {
+                *more = if passed.is_empty() && holds { 2.0 * *more } else { (*more / 2.0_f64).floor() };
+            }
+            if holds {
+                steps = kept;
+            }
         }
-        let kept: Vec<f64> = (0..steps.len()).map(|i| if above.contains(&i) { steps[i] } else { tried[i] }).collect();
-        if kept == steps {
-            return Ok(steps);
+        let mut stopped: Vec<Vec<String>> = scheduled.binding.clone();
+        for i in 0..steps.len() {
+            let is_fastest = steps[i] >= most[i];
+            stopped[i].retain(|name| (name == "feed_max") == is_fastest);
+            if is_fastest {
+                stopped[i] = vec!["feed_max".to_owned()];
+            } else if steps.len() <= MOST_TRIED {
+                stopped[i] = self.stopped(&mut steps, i, most[i])?;
+            }
         }
-        let feeds = self.feeds(&kept);
-        let reached = self.drive(&feeds)?;
-        Ok(if self.above(&reached, &feeds).is_empty() && !is_used_up(&reached) { kept } else { steps })
+        Ok((steps, stopped))
     }
 
-    /// The lines that pass a limit of their own, or go faster than one beside them may.
+    /// Raises one line as far as it holds, and says what one step more would pass, in whichever line.
+    fn stopped(&self, steps: &mut [f64], at: usize, most: f64) -> Result<Vec<String>, Failure> {
+        while steps[at] < most {
+            steps[at] += 1.0;
+            let passed = self.passed_at(steps)?;
+            if passed.iter().any(|names| !names.is_empty()) {
+                steps[at] -= 1.0;
+                let names: std::collections::BTreeSet<&str> = passed.into_iter().flatten().collect();
+                return Ok(names.into_iter().map(ToOwned::to_owned).collect());
+            }
+        }
+        Ok(vec!["feed_max".to_owned()])
+    }
+
+    /// The limits that each line passes at some feeds; an edge that is used too much is one of each of its lines.
+    fn passed_at(&self, steps: &[f64]) -> Result<Vec<Vec<&'static str>>, Failure> {
+        let feeds = self.feeds(steps);
+        let reached = self.drive(&feeds)?;
+        let mut passed: Vec<Vec<&'static str>> =
+            (0..self.lines.len()).map(|i| self.passed(&reached, &feeds, i)).collect();
+        if self.refeed.tool_usage_max.zip(self.largest_usage(&reached)).is_some_and(|(most, usage)| usage > most) {
+            for names in &mut passed {
+                names.push("tool_usage");
+            }
+        }
+        Ok(passed)
+    }
+
+    /// The limits of its own that a line passes, and that on what is beside it.
+    fn passed(&self, reached: &[Reached], feeds: &[f64], i: usize) -> Vec<&'static str> {
+        let one = &reached[i];
+        let pairs = [
+            ("deflection", one.deflection_um, self.refeed.deflection_max_um),
+            ("roughness", one.roughness_um, self.refeed.roughness_max_um),
+        ];
+        let forces = stretch::FORCES.iter().zip(&one.forces);
+        let forces = forces.map(|(force, value)| (force.name, Some(*value), (force.limit)(self.refeed)));
+        let is_above = |value: f64, limit: f64| value > limit * (1.0 + KEPT);
+        let own = pairs.into_iter().chain(forces);
+        let own =
+            own.filter(|(_, value, limit)| value.zip(*limit).is_some_and(|(value, limit)| is_above(value, limit)));
+        let ratio = self.refeed.feed_step_ratio_max.unwrap_or(f64::INFINITY);
+        let beside = |j: usize| is_above(feeds[i], feeds[j] * ratio);
+        let is_stepped = (i + 1 < feeds.len() && self.lines[i].touches_next && beside(i + 1))
+            || (i > 0 && self.lines[i - 1].touches_next && beside(i - 1));
+        own.map(|(name, ..)| name).chain(is_stepped.then_some("feed_step")).collect()
+    }
+
+    /// The lines that pass a limit.
     fn above(&self, reached: &[Reached], feeds: &[f64]) -> Vec<usize> {
-        let own = |i: usize| {
-            let pairs = [
-                (reached[i].deflection_um, self.refeed.deflection_max_um),
-                (reached[i].roughness_um, self.refeed.roughness_max_um),
-            ];
-            let forces = stretch::FORCES.iter().zip(&reached[i].forces);
-            let forces = forces.map(|(force, value)| (Some(*value), (force.limit)(self.refeed)));
-            pairs
-                .into_iter()
-                .chain(forces)
-                .filter_map(|(value, limit)| value.zip(limit))
-                .any(|(value, limit)| value > limit * (1.0 + KEPT))
-        };
-        let beside = |i: usize, j: usize| {
-            let ratio = self.refeed.feed_step_ratio_max.unwrap_or(f64::INFINITY);
-            feeds[i] > feeds[j] * ratio * (1.0 + KEPT)
-        };
-        let is_stepped = |i: usize| {
-            (i + 1 < feeds.len() && self.lines[i].touches_next && beside(i, i + 1))
-                || (i > 0 && self.lines[i - 1].touches_next && beside(i, i - 1))
-        };
-        (0..self.lines.len()).filter(|&i| own(i) || is_stepped(i)).collect()
+        (0..self.lines.len()).filter(|&i| !self.passed(reached, feeds, i).is_empty()).collect()
     }
 
     /// The largest usage of an edge.
