@@ -100,11 +100,13 @@ pub(crate) fn zero_that_fits(
     Ok(None)
 }
 
-/// Lines that own enough of the surface to be said to finish it: alone, or with the lines before and behind them, as the short
+/// Lines that own enough of the surface to be said to finish it: alone, or with others as short before and behind them, as the
 /// blocks of a contour that a CAM system wrote.
 pub(crate) fn lines_that_finish(turned: &Turned) -> Vec<usize> {
     let owned: Vec<(usize, f64)> = turned.owned.iter().map(|(&line, &length)| (line, length)).collect();
-    let runs = owned.chunk_by(|(line, _), (next, _)| line + 1 == *next);
+    let is_short = |length: f64| length < FINISHES_MM;
+    let runs =
+        owned.chunk_by(|(line, length), (next, of_next)| line + 1 == *next && is_short(*length) && is_short(*of_next));
     let finishing = runs.filter(|run| run.iter().map(|(_, length)| length).sum::<f64>() >= FINISHES_MM);
     finishing.flatten().map(|(line, _)| *line).collect()
 }
