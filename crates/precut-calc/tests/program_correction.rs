@@ -224,7 +224,7 @@ fn programs_of_every_control_are_corrected_and_proved() {
     assert!(changed > 20 && compared > 30 * changed, "{changed}, {compared}");
 }
 
-fn draws(in_the_suite: u64) -> u64 {
+pub(crate) fn draws(in_the_suite: u64) -> u64 {
     std::env::var("PRECUT_PROGRAMS")
         .ok()
         .and_then(|text| text.parse().ok())

@@ -6,7 +6,7 @@ use precut_calc::program_compensation::{Outcome, ProgramCompensation, RefedProgr
 use serde_json::{Value, json};
 
 use crate::draw::Draw;
-use crate::program_correction::off_from_told;
+use crate::program_correction::{draws, off_from_told};
 use crate::program_reading::number;
 use crate::program_yielding::{DIALECTS, cases, job_of, shaft, try_solve};
 
@@ -140,13 +140,6 @@ fn json_read(job: &Value) -> Value {
     job
 }
 
-fn draws(in_the_suite: u64) -> u64 {
-    std::env::var("PRECUT_PROGRAMS")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .map_or(in_the_suite, |all: u64| all.div_ceil(5))
-}
-
 /// Programs of every control, whatever binds: only feeds differ, the part stays, no limit is passed when what comes back is driven as
 /// a program of its own, and the same feeds come of every control.
 #[test]
@@ -237,6 +230,33 @@ fn one_step_more_passes_what_binds() {
         }
     }
     assert!(tried > 2, "{tried}");
+}
+
+/// A limit that is loosened by a tenth takes off the time what its price, the exponent of the time, says, but for whole steps of the
+/// feed: a thousandth of a millimetre is about a percent of these feeds.
+#[test]
+fn a_looser_limit_brings_what_its_price_says() {
+    let mut tried = 0;
+    for seed in 0..draws(2) {
+        let given = shaft(&mut Draw::new(3300 + seed), "fanuc_a");
+        for (limits, constraint, field) in [
+            (deflection_um(&given, 0.7), "deflection", "deflection_max_um"),
+            (json!({ "force_z_max_n": 450.0 }), "force_z", "force_z_max_n"),
+        ] {
+            let job = refeed(&given, &limits);
+            let Ok(answer) = try_solve(&job) else { continue };
+            let told = refed(&answer);
+            let Some(price) = told.prices.iter().find(|price| price.constraint == constraint) else { continue };
+            let mut looser = job.clone();
+            looser["refeed"][field] = json!(1.1 * limits[field].as_f64().unwrap());
+            let after = try_solve(&looser).unwrap();
+            let brought = 100.0 * (1.0 - refed(&after).cutting_time_after_min / told.cutting_time_after_min);
+            let told = 100.0 * (1.0 - 1.1_f64.powf(-price.gain_percent));
+            assert!((brought - told).abs() < 1.2, "{seed} {field}: told {told}, brought {brought}");
+            tried += 1;
+        }
+    }
+    assert!(tried > 1, "{tried}");
 }
 
 /// A bar on which one line cuts, whatever it says.

@@ -2,7 +2,7 @@
 //!
 //! A stretch is a zone of unit speed and of unit work per length, so that its time is that of the stretch; what comes out of it
 //! is a power of the feed (or rises with its logarithm) through what came out at the feed that it was tried at. All the rest is
-//! the schedule's: program, solver, limits that bind, prices, conflict.
+//! the schedule's: program, solver, prices, conflict.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,6 @@ use crate::machinability::{MachinabilityModel, ModelForm};
 use crate::shaft::{Carriage, FeedDirection};
 
 use super::acting::{ActingModel, Form};
-use super::binding::binding;
 use super::case::{Case, CustomCase};
 use super::input::{
     CustomLimit, FeedMode, Goal, Job, Limits, Machine, Reference, SpeedMode, UsageScope, Variables, Zone,
@@ -28,7 +27,7 @@ use super::solve::solve;
 /// Step of a feed as it is written, mm per revolution.
 pub(crate) use super::words::step_of;
 
-/// What came out at the feed that was tried, and how it goes with the feed.
+/// An output at the feed that was tried, and its law of the feed through that.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Through {
     /// The output at that feed.
@@ -73,7 +72,7 @@ pub(crate) struct Stretch {
     pub(crate) outputs: Vec<Option<Through>>,
 }
 
-/// What must hold.
+/// The limits.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bounds {
     pub(crate) feed_mm_per_rev: [f64; 2],
@@ -99,8 +98,6 @@ pub(crate) struct PriceOfLimit {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Scheduled {
     pub(crate) feeds_mm_per_rev: Vec<f64>,
-    /// What binds each of the stretches, the most costly first.
-    pub(crate) binding: Vec<Vec<String>>,
     /// The most costly first.
     pub(crate) prices: Vec<PriceOfLimit>,
 }
@@ -110,15 +107,6 @@ pub(crate) fn fastest(stretches: &[Stretch], bounds: &Bounds, monitor: &dyn Moni
     let job = job(stretches, bounds);
     let case = case(&job, stretches, bounds)?;
     let solved = solve(&case, true, monitor).map_err(|unsolved| worded(unsolved, &job))?;
-    let mut bound: Vec<Vec<String>> = vec![Vec::new(); stretches.len()];
-    for limit in binding(&case, &solved) {
-        for (stretch, names) in stretches.iter().zip(&mut bound) {
-            let is_of_all = limit.zone == "part" || limit.zone == stretch.tool;
-            if is_of_all || limit.zone.split('|').any(|id| id == stretch.id) {
-                names.push(limit.constraint.clone());
-            }
-        }
-    }
     let again = Again { job: &job, held: None, split: None, is_possible: false };
     let mut prices: Vec<PriceOfLimit> = Vec::new();
     for price in prices::prices(&case, &solved, &again, monitor)? {
@@ -136,7 +124,7 @@ pub(crate) fn fastest(stretches: &[Stretch], bounds: &Bounds, monitor: &dyn Moni
     }
     prices.sort_by(|a, b| b.gain_percent.total_cmp(&a.gain_percent));
     let feeds_mm_per_rev = solved.at.iter().map(|(_, x)| x.exp()).collect();
-    Ok(Scheduled { feeds_mm_per_rev, binding: bound, prices })
+    Ok(Scheduled { feeds_mm_per_rev, prices })
 }
 
 /// The stretches as zones one behind the other.

@@ -118,7 +118,8 @@ pub struct RefedFeeds {
     /// Feed of the program that is given back.
     #[schema(extensions(("x-unit" = json!("mm/rev"))))]
     pub new_feed_mm_per_rev: Vec<f64>,
-    /// Limits that keep it from being faster, the most costly first.
+    /// Limits that one step more of its feed passes, in this line or another; of more than 40 lines those that were passed when
+    /// the lines were raised together.
     pub binding: Vec<Vec<String>>,
 }
 
@@ -166,7 +167,7 @@ impl RefedProgram {
             feeds.depth_mm.push(one.depth_mm);
             feeds.old_feed_mm_per_rev.push(one.feeds_mm_per_rev[0]);
             feeds.new_feed_mm_per_rev.push(one.feeds_mm_per_rev[1]);
-            feeds.binding.push(one.binding.clone());
+            feeds.binding.push(one.binding.iter().copied().map(str::to_owned).collect());
         }
         let price = |one: &PriceOfLimit| RefedPrice {
             constraint: one.constraint.clone(),
@@ -540,7 +541,7 @@ impl CutsAlong {
 /// centre.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct LeftSurface {
-    /// Lines of the program that make at least 0.3 mm of it.
+    /// Lines of the program that make at least 0.3 mm of it, alone or with others as short before and behind them.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub finishing_lines: Vec<usize>,
     /// Where a part begins, from the headstock end.

@@ -7,6 +7,8 @@
 mod stretch;
 mod words;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::calculator::{Failure, Finding, Monitor};
 use crate::deflection_compensation::Holding;
 use crate::feed_schedule::stretches::{Bounds, PriceOfLimit, Scheduled, fastest};
@@ -35,6 +37,16 @@ const MOST_TRIED: usize = 40;
 const LESS_USAGE: f64 = 0.999;
 /// Above a limit by a smaller share is none.
 const KEPT: f64 = 1e-9;
+
+/// Names of limits.
+pub(crate) type Names = BTreeSet<&'static str>;
+
+/// Feeds in whole steps, with what stops each line and what a looser limit would bring.
+struct Settled {
+    steps: Vec<f64>,
+    binding: Vec<Names>,
+    prices: Vec<PriceOfLimit>,
+}
 
 /// A program with other feeds.
 #[derive(Debug, Clone)]
@@ -71,7 +83,7 @@ impl Refed {
 
     /// The same with what a correction made of it: one change of each line of the given program.
     pub(crate) fn joined(&self, corrected: Corrected, given: &str) -> Corrected {
-        let mut changed: std::collections::BTreeMap<usize, ChangedLine> =
+        let mut changed: BTreeMap<usize, ChangedLine> =
             self.changed.iter().map(|one| (one.line, one.clone())).collect();
         for one in &corrected.changed {
             let old = changed.get(&one.line).map_or_else(|| one.old.clone(), |refed| refed.old.clone());
@@ -93,7 +105,8 @@ pub(crate) struct RefedStretch {
     pub(crate) ends_mm: [f64; 2],
     pub(crate) depth_mm: f64,
     pub(crate) feeds_mm_per_rev: [f64; 2],
-    pub(crate) binding: Vec<String>,
+    /// The limits that one step more passes.
+    pub(crate) binding: Names,
 }
 
 /// A limit and what is reached of it.
@@ -146,7 +159,7 @@ pub(crate) fn refed(
         return Err(Failure::OutOfModel(Finding::new("nothing_to_refeed", "/nc_program")));
     }
     let task = Task { program, job, refeed, holding, blank, finishing, lines, monitor };
-    let (steps, scheduled) = task.settled(before)?;
+    let Settled { steps, binding, prices } = task.settled(before)?;
     let feeds = task.feeds(&steps);
     let text = written((program, job), &task.lines, &feeds, monitor)?;
     let mut again = job.clone();
@@ -157,7 +170,7 @@ pub(crate) fn refed(
     if let Some(&at) = task.above(&reached, &feeds).first() {
         return Err(failed("limit", task.lines[at].line));
     }
-    let stretches = task.lines.iter().zip(&feeds).zip(&reached).zip(scheduled.binding);
+    let stretches = task.lines.iter().zip(&feeds).zip(&reached).zip(binding);
     let stretches = stretches.map(|(((line, &feed), reached), binding)| RefedStretch {
         line: line.line,
         tool: line.tool,
@@ -174,7 +187,7 @@ pub(crate) fn refed(
         limits: task.limits(&reached),
         stretches: stretches.collect(),
         kept_lines,
-        prices: scheduled.prices,
+        prices,
         lines_compared: program.lines - text.changed.len(),
         moves_compared: text.program.moves.len(),
         text: text.text,
@@ -192,8 +205,7 @@ fn failed(part: &'static str, line: usize) -> Failure {
 
 impl Task<'_> {
     fn drive_read(&self, job: &Job, program: &Program) -> Result<Yielded, Failure> {
-        let driven =
-            Driven { finishing: self.finishing, corrected: &std::collections::BTreeSet::new(), bends_as: None };
+        let driven = Driven { finishing: self.finishing, corrected: &BTreeSet::new(), bends_as: None };
         yielding(program, job, self.holding, self.blank, driven, self.monitor)
     }
 
@@ -214,14 +226,14 @@ impl Task<'_> {
         self.lines.iter().zip(steps).map(|(line, steps)| steps * line.step_mm_per_rev).collect()
     }
 
-    /// Feeds in whole steps that keep all limits, and the schedule that they come from.
-    fn settled(&self, before: &Yielded) -> Result<(Vec<f64>, Scheduled), Failure> {
+    /// Feeds in whole steps that keep all limits.
+    fn settled(&self, before: &Yielded) -> Result<Settled, Failure> {
         let mut bounds = bounds(self.refeed);
         let mut feeds: Vec<f64> = self.lines.iter().map(|line| line.feed_mm_per_rev).collect();
         let mut reached = self.reached(before);
         for _ in 0..MOST_USAGES {
             let (exact, scheduled, last) = self.scheduled(&bounds, feeds, reached)?;
-            let (steps, binding) = self.in_steps(&exact, &scheduled)?;
+            let (steps, binding) = self.in_steps(&exact)?;
             let rounded = self.feeds(&steps);
             let now = self.drive(&rounded)?;
             // Slower is not always better for an edge.
@@ -229,7 +241,7 @@ impl Task<'_> {
                 (Some(most), Some(usage)) if usage > most * (1.0 + KEPT) => {
                     bounds.tool_usage_max = bounds.tool_usage_max.map(|asked| asked * most / usage * LESS_USAGE);
                 }
-                _ => return Ok((steps, Scheduled { binding, ..scheduled })),
+                _ => return Ok(Settled { steps, binding, prices: scheduled.prices }),
             }
             (feeds, reached) = (exact, last);
         }
@@ -286,7 +298,7 @@ impl Task<'_> {
     }
 
     /// Whole steps: down to what is allowed, then up as far as that still is; what stops each line.
-    fn in_steps(&self, feeds: &[f64], scheduled: &Scheduled) -> Result<(Vec<f64>, Vec<Vec<String>>), Failure> {
+    fn in_steps(&self, feeds: &[f64]) -> Result<(Vec<f64>, Vec<Names>), Failure> {
         let [low, high] = [self.refeed.feed_min_mm_per_rev, self.refeed.feed_max_mm_per_rev];
         let least = |line: &CuttingLine| (low / line.step_mm_per_rev * (1.0 - KEPT)).ceil();
         let most = |line: &CuttingLine| (high / line.step_mm_per_rev * (1.0 + KEPT)).floor();
@@ -298,7 +310,7 @@ impl Task<'_> {
             let now = self.feeds(&steps);
             let above = self.above(&self.drive(&now)?, &now);
             if above.is_empty() {
-                return self.raised(steps, scheduled, most);
+                return self.raised(steps, &self.lines.iter().map(most).collect::<Vec<f64>>());
             }
             for at in above {
                 if steps[at] - 1.0 < least(&self.lines[at]) {
@@ -310,15 +322,11 @@ impl Task<'_> {
         Err(self.not_settled(0))
     }
 
-    /// Steps as far up as they hold, and what stops each line: many lines by more and more steps at once, then each by itself.
-    fn raised(
-        &self,
-        mut steps: Vec<f64>,
-        scheduled: &Scheduled,
-        most: impl Fn(&CuttingLine) -> f64,
-    ) -> Result<(Vec<f64>, Vec<Vec<String>>), Failure> {
-        let most: Vec<f64> = self.lines.iter().map(most).collect();
+    /// Steps as far up as they hold, and the limits that stop each line: all lines by more and more steps at once, then each by
+    /// itself.
+    fn raised(&self, mut steps: Vec<f64>, most: &[f64]) -> Result<(Vec<f64>, Vec<Names>), Failure> {
         let mut more = vec![1.0; steps.len()];
+        let mut stopped = vec![Names::new(); steps.len()];
         for _ in 0..MOST_STEPS {
             let tried: Vec<f64> = (0..steps.len()).map(|i| (steps[i] + more[i]).min(most[i])).collect();
             if tried == steps {
@@ -327,57 +335,67 @@ impl Task<'_> {
             let passed = self.passed_at(&tried)?;
             let kept: Vec<f64> =
                 (0..steps.len()).map(|i| if passed[i].is_empty() { tried[i] } else { steps[i] }).collect();
-            let holds = kept == tried || (kept != steps && self.passed_at(&kept)?.iter().all(Vec::is_empty));
-            for (more, passed) in more.iter_mut().zip(&passed) {
-                *more = if passed.is_empty() && holds { 2.0 * *more } else { (*more / 2.0_f64).floor() };
+            // What those that pass none by themselves pass together.
+            let together: Names =
+                if kept == tried { Names::new() } else { self.passed_at(&kept)?.into_iter().flatten().collect() };
+            for i in 0..steps.len() {
+                if passed[i].is_empty() && together.is_empty() {
+                    more[i] *= 2.0;
+                } else {
+                    more[i] = (more[i] / 2.0_f64).floor();
+                    stopped[i] = if passed[i].is_empty() { together.clone() } else { passed[i].clone() };
+                }
             }
-            if holds {
+            if together.is_empty() {
                 steps = kept;
             }
         }
-        let mut stopped: Vec<Vec<String>> = scheduled.binding.clone();
-        for i in 0..steps.len() {
-            let is_fastest = steps[i] >= most[i];
-            stopped[i].retain(|name| (name == "feed_max") == is_fastest);
-            if is_fastest {
-                stopped[i] = vec!["feed_max".to_owned()];
-            } else if steps.len() <= MOST_TRIED {
-                stopped[i] = self.stopped(&mut steps, i, most[i])?;
+        if steps.len() <= MOST_TRIED {
+            self.raise_each(&mut steps, most, &mut stopped)?;
+        }
+        for (i, names) in stopped.iter_mut().enumerate() {
+            if steps[i] >= most[i] {
+                *names = Names::from(["feed_max"]);
             }
         }
         Ok((steps, stopped))
     }
 
-    /// Raises one line as far as it holds, and says what one step more would pass, in whichever line.
-    fn stopped(&self, steps: &mut [f64], at: usize, most: f64) -> Result<Vec<String>, Failure> {
-        while steps[at] < most {
-            steps[at] += 1.0;
-            let passed = self.passed_at(steps)?;
-            if passed.iter().any(|names| !names.is_empty()) {
-                steps[at] -= 1.0;
-                let names: std::collections::BTreeSet<&str> = passed.into_iter().flatten().collect();
-                return Ok(names.into_iter().map(ToOwned::to_owned).collect());
+    /// Raises each line by itself until one step more of any passes a limit, in whichever line.
+    fn raise_each(&self, steps: &mut [f64], most: &[f64], stopped: &mut [Names]) -> Result<(), Failure> {
+        let mut is_higher = true;
+        while is_higher {
+            is_higher = false;
+            for i in 0..steps.len() {
+                while steps[i] < most[i] {
+                    steps[i] += 1.0;
+                    stopped[i] = self.passed_at(steps)?.into_iter().flatten().collect();
+                    if !stopped[i].is_empty() {
+                        steps[i] -= 1.0;
+                        break;
+                    }
+                    is_higher = true;
+                }
             }
         }
-        Ok(vec!["feed_max".to_owned()])
+        Ok(())
     }
 
     /// The limits that each line passes at some feeds; an edge that is used too much is one of each of its lines.
-    fn passed_at(&self, steps: &[f64]) -> Result<Vec<Vec<&'static str>>, Failure> {
+    fn passed_at(&self, steps: &[f64]) -> Result<Vec<Names>, Failure> {
         let feeds = self.feeds(steps);
         let reached = self.drive(&feeds)?;
-        let mut passed: Vec<Vec<&'static str>> =
-            (0..self.lines.len()).map(|i| self.passed(&reached, &feeds, i)).collect();
+        let mut passed: Vec<Names> = (0..self.lines.len()).map(|i| self.passed(&reached, &feeds, i)).collect();
         if self.refeed.tool_usage_max.zip(self.largest_usage(&reached)).is_some_and(|(most, usage)| usage > most) {
             for names in &mut passed {
-                names.push("tool_usage");
+                names.insert("tool_usage");
             }
         }
         Ok(passed)
     }
 
     /// The limits of its own that a line passes, and that on what is beside it.
-    fn passed(&self, reached: &[Reached], feeds: &[f64], i: usize) -> Vec<&'static str> {
+    fn passed(&self, reached: &[Reached], feeds: &[f64], i: usize) -> Names {
         let one = &reached[i];
         let pairs = [
             ("deflection", one.deflection_um, self.refeed.deflection_max_um),
@@ -403,7 +421,7 @@ impl Task<'_> {
 
     /// The largest usage of an edge.
     fn largest_usage(&self, reached: &[Reached]) -> Option<f64> {
-        let mut by_tool = std::collections::BTreeMap::<Option<u32>, f64>::new();
+        let mut by_tool = BTreeMap::<Option<u32>, f64>::new();
         for (line, reached) in self.lines.iter().zip(reached) {
             *by_tool.entry(line.tool).or_default() += reached.tool_usage?;
         }
