@@ -18,7 +18,7 @@ mod number;
 mod template;
 
 pub(crate) use described::described;
-pub(crate) use glossary::{Glossary, capitalised};
+pub(crate) use glossary::{Glossary, capitalised, within};
 pub(crate) use kept::{datum, reworded, reworded_rows};
 pub use language::Language;
 pub(crate) use mark::{Mark, Said, told};

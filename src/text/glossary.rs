@@ -185,7 +185,7 @@ impl Glossary {
 }
 
 /// A name as inside a sentence: an abbreviation or a name keeps its capitals.
-pub(super) fn within(name: &str) -> String {
+pub(crate) fn within(name: &str) -> String {
     let mut letters = name.chars();
     match (letters.next(), letters.next()) {
         (Some(first), Some(second)) if second.is_lowercase() => {

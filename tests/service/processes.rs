@@ -366,6 +366,15 @@ async fn what_a_new_path_brought_is_told_drawn_and_given_as_a_table() {
     assert!((last[4].parse::<f64>().unwrap() - gained).abs() < 1e-9);
     let of_model = table("model").await;
     assert!(of_model.lines().any(|line| line.starts_with("tailstock_compliance,")), "{of_model}");
+    // Of two that warm up with different time constants each is told apart.
+    let state = got(&server, "/v1/processes/shaft-560/state").await;
+    let sizes = state["model"]["sizes"].as_array().unwrap();
+    let mut said: Vec<String> =
+        sizes.iter().map(|size| format!("{} {} {}", size["text"], size["parameter"], size["since_part"])).collect();
+    assert!(said.iter().any(|text| text.contains("Thermal growth, time constant 2")), "{said:?}");
+    said.sort();
+    said.dedup();
+    assert_eq!(said.len(), sizes.len(), "{said:?}");
     let drawn = server.get("/v1/processes/shaft-560/state?figure=gain").header("accept", "image/svg+xml");
     assert!(drawn.send().await.unwrap().text().await.unwrap().starts_with("<svg"));
     server.stop().await;

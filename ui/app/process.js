@@ -118,10 +118,11 @@ const size = cause =>
 
 /** What paths brought so far. */
 function Gain(gain) {
-  const [lower, upper] = gain.form_gain_interval_95;
+  const isLost = gain.form_gain_um < 0;
+  const [lower, upper] = isLost ? gain.form_gain_interval_95.map(end => -end).reverse() : gain.form_gain_interval_95;
   return html`
     <section class="process-gain"><h2>${t('process_gain')}</h2>
-      <p>${t('process_gained', { form: number(gain.form_gain_um, SIZE_DIGITS), lower: number(lower, SIZE_DIGITS), upper: number(upper, SIZE_DIGITS), parts: number(gain.parts), other: number(gain.parts_cut_with_new_path) })}</p>
+      <p>${t(isLost ? 'process_lost' : 'process_gained', { form: number(Math.abs(gain.form_gain_um), SIZE_DIGITS), lower: number(lower, SIZE_DIGITS), upper: number(upper, SIZE_DIGITS), parts: number(gain.parts), other: number(gain.parts_cut_with_new_path) })}</p>
       <p>${t('process_saved', { saved: number(gain.parts_saved, 2), spoilt: number(gain.parts_spoilt, 2) })}</p>
     </section>`;
 }
@@ -132,7 +133,7 @@ function Model({ sizes }) {
     <section class="process-model"><h2>${t('process_model')}</h2>
       <ul>${sizes.map(
         own =>
-          html`<li key=${own.kind + own.label + own.since_part + own.parameter}>${capital(own.text)} ${own.label} <span class="number">${size(own)}</span>${own.since_part ? html` <span class="quiet">${t('process_model_since', { since: number(own.since_part) })}</span>` : ''}</li>`,
+          html`<li key=${own.text + own.label + own.since_part + own.parameter}>${capital(own.text)} ${own.label} <span class="number">${size(own)}</span>${own.since_part ? html` <span class="quiet">${t('process_model_since', { since: number(own.since_part) })}</span>` : ''}</li>`,
       )}</ul>
     </section>`;
 }

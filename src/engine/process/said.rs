@@ -1,11 +1,13 @@
 //! What is said of a process and its parts, as it stands in documents: in English with its codes and numbers, and in any
 //! other language from those.
 
+use std::fmt::Write as _;
+
 use precut_calc::process::{Outlook, State};
 use serde_json::{Value, json};
 
 use super::body::Document;
-use crate::text::{Glossary, Language, Texts, reworded};
+use crate::text::{Glossary, Language, Texts, reworded, within};
 
 /// What is said of a process of a name after an entry and so many parts.
 pub(super) fn state(
@@ -71,10 +73,17 @@ pub(super) fn news(before: Option<&State>, now: &State, replayed: usize) -> Vec<
     news
 }
 
-/// What the causes of a change or of a model are called.
+/// What the causes of a change or of a model are called, with the form that tells one from another of its kind.
 fn name_causes(causes: Option<&mut Value>, language: Language) {
+    let glossary = Glossary::of(language);
     for cause in causes.and_then(Value::as_array_mut).into_iter().flatten() {
-        cause["text"] = json!(cause["kind"].as_str().map(|kind| Glossary::of(language).name(kind)));
+        let Some(mut text) = cause["kind"].as_str().map(|kind| glossary.name(kind)) else { continue };
+        for own in cause["shape"].as_array().into_iter().flatten() {
+            let (Some(parameter), Some(unit)) = (own["parameter"].as_str(), own["unit"].as_str()) else { continue };
+            let name = within(&glossary.label("", parameter, Some(unit)));
+            let _ = write!(text, ", {name} {} {}", own["value"], glossary.unit(unit));
+        }
+        cause["text"] = json!(text);
     }
 }
 

@@ -78,6 +78,7 @@ pub(super) fn model_size(catalogue: &Catalogue, column: &Column, mean: f64, devi
         label: name.label.clone(),
         since_part: column.since.map(|(since, _)| since),
         form: column.since.map(|(_, form)| form_of(form)),
+        shape: own.shape.clone(),
         parameter: own.parameter,
         unit: own.unit,
         delta: at(0.0),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::document::{Document, GaugeCheck, Part};
+use super::state::ModelShape;
 use crate::calculator::{
     Calculator, Failure, Hypothesis, Measurement, Monitor, PrepareError, Rows, Smooth, Treatment, Watched,
 };
@@ -38,6 +39,8 @@ pub(super) struct Variant {
     pub(super) range: [f64; 2],
     /// Which of the variables of the hypothesis, and what the others are; none of the gauge.
     pub(super) setting: Option<(usize, Vec<f64>)>,
+    /// The form that it has: what tells it from the other columns of its cause.
+    pub(super) shape: Vec<ModelShape>,
     /// Whether it is free although nothing changed.
     pub(super) in_null: bool,
 }
@@ -258,6 +261,7 @@ impl<M: Watched> Eye<M> {
             prior_sd: GAUGE_UM,
             range: [f64::NEG_INFINITY, f64::INFINITY],
             setting: None,
+            shape: Vec::new(),
             in_null: false,
         });
         causes.push((gauge, vec![2.0 * GAUGE_UM * per_um; base.len()]));
@@ -278,6 +282,9 @@ fn of_size(catalogue: &mut Catalogue, hypothesis: &Hypothesis, variable: usize, 
         Treatment::Amplitude { prior_sd } => prior_sd,
         _ => 1.0,
     };
+    let shape =
+        hypothesis.variables.iter().zip(values).filter(|(of, _)| matches!(of.treatment, Treatment::Shape { .. }));
+    let shape = shape.map(|(of, &value)| ModelShape { parameter: of.name, unit: of.unit, value });
     Variant {
         name: catalogue.name(hypothesis.cause.kind, &hypothesis.label),
         parameter: own.name,
@@ -285,6 +292,7 @@ fn of_size(catalogue: &mut Catalogue, hypothesis: &Hypothesis, variable: usize, 
         prior_sd,
         range: [own.range.lower, own.range.upper],
         setting: Some((variable, values.to_vec())),
+        shape: shape.collect(),
         in_null: false,
     }
 }

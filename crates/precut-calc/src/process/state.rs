@@ -215,6 +215,17 @@ pub struct Model {
     pub remainder_deviation: Vec<f64>,
 }
 
+/// A field of an effect that gives its form.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModelShape {
+    /// The field.
+    pub parameter: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+}
+
 /// A size of the model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSize {
@@ -229,6 +240,9 @@ pub struct ModelSize {
     /// How it goes on from there; of a drift the size is that after 20 parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<ChangeForm>,
+    /// The form of the effect, where several of one kind act: the machine may warm up with several time constants.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shape: Vec<ModelShape>,
     /// The field of the effect.
     pub parameter: &'static str,
     /// Its unit.
