@@ -110,11 +110,18 @@ pub async fn verify(copy: &Path) -> Result<Contents, BackupError> {
     if bad > 0 {
         return Err(damaged(format!("{bad} of {results} results are damaged")));
     }
-    let jobs = count(&mut database, "SELECT count(*) FROM precut_jobs").await.map_err(failed)?;
-    // A copy may be older than the table of all documents.
-    let old =
-        count(&mut database, "SELECT count(*) FROM sqlite_master WHERE name = 'models'").await.map_err(failed)? > 0;
-    let count_documents = if old { "SELECT count(*) FROM models" } else { "SELECT count(*) FROM documents" };
+    // A copy may be older than the names of its tables.
+    let has_jobs = "SELECT count(*) FROM sqlite_master WHERE name = 'jobs'";
+    let count_jobs = match count(&mut database, has_jobs).await.map_err(failed)? {
+        0 => "SELECT count(*) FROM precut_jobs",
+        _ => "SELECT count(*) FROM jobs",
+    };
+    let jobs = count(&mut database, count_jobs).await.map_err(failed)?;
+    let has_models = "SELECT count(*) FROM sqlite_master WHERE name = 'models'";
+    let count_documents = match count(&mut database, has_models).await.map_err(failed)? {
+        0 => "SELECT count(*) FROM documents",
+        _ => "SELECT count(*) FROM models",
+    };
     let documents = count(&mut database, count_documents).await.map_err(failed)?;
     database.close().await.map_err(failed)?;
     let bytes = fs::metadata(copy).map_err(|error| BackupError::File(copy.to_owned(), error))?.len();

@@ -5,8 +5,6 @@
 //! Who tries it holds it for a time, as a computation is held under a lease: who dies meanwhile loses it, and it is tried
 //! again. So it is delivered at least once.
 
-use serde::Deserialize;
-
 use super::jobs::{JobId, Lease};
 
 /// What is told.
@@ -48,7 +46,7 @@ pub struct NewCallback {
 }
 
 /// What has become of a callback.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Callback {
     /// Where.
     pub url: String,
@@ -64,16 +62,8 @@ pub struct Callback {
     pub settled_ms: Option<i64>,
 }
 
-impl Callback {
-    /// As a store tells it.
-    pub(super) fn read(text: &str) -> Result<Self, sqlx::Error> {
-        serde_json::from_str(text).map_err(|error| sqlx::Error::Decode(error.into()))
-    }
-}
-
 /// How far a callback is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CallbackState {
     /// Its job is not over.
     Waiting,
@@ -83,6 +73,19 @@ pub enum CallbackState {
     Delivered,
     /// Nobody has, however often it was tried.
     GivenUp,
+}
+
+impl CallbackState {
+    /// From what is kept.
+    pub(super) fn of_word(word: &str) -> Option<Self> {
+        match word {
+            "waiting" => Some(Self::Waiting),
+            "pending" => Some(Self::Pending),
+            "delivered" => Some(Self::Delivered),
+            "given_up" => Some(Self::GivenUp),
+            _ => None,
+        }
+    }
 }
 
 /// How callbacks are taken up.

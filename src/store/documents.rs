@@ -2,8 +2,6 @@
 //! watch. Each belongs to somebody and has revisions that never change.
 
 use futures_util::future::BoxFuture;
-use sqlx::postgres::PgRow;
-use sqlx::sqlite::SqliteRow;
 
 use super::StoreError;
 use super::quota::{Quota, Usage};
@@ -57,8 +55,7 @@ pub struct KeptDocument {
     pub created_ms: i64,
 }
 
-from_row!(SqliteRow => KeptDocument { name, revision as i32, class, content, sha256, created_ms });
-from_row!(PgRow => KeptDocument { name, revision as i32, class, content, sha256, created_ms });
+from_row!(KeptDocument { name, revision as i32, class, content, sha256, created_ms });
 
 /// What is searched of a document.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,8 +68,7 @@ pub struct Title {
     pub words: String,
 }
 
-from_row!(SqliteRow => Title { name, class, words });
-from_row!(PgRow => Title { name, class, words });
+from_row!(Title { name, class, words });
 
 /// The revisions of a name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -204,8 +200,7 @@ pub(super) struct Newest {
     created_ms: i64,
 }
 
-from_row!(SqliteRow => Newest { revision as i32, sha256, created_ms });
-from_row!(PgRow => Newest { revision as i32, sha256, created_ms });
+from_row!(Newest { revision as i32, sha256, created_ms });
 
 impl NewDocuments {
     /// What becomes of a document beside the newest revision of its name: where it is kept already, that; else whether its name
@@ -238,9 +233,4 @@ impl NewDocuments {
         let bytes = new().map(|new| new.content.len() as u64).sum();
         usage.filter(|usage| !usage.has_room(&self.quota, bytes)).map(PutDocuments::OverQuota)
     }
-}
-
-/// A revision as a column; beyond what a column holds there is none.
-pub(super) fn column(revision: Option<u32>) -> Option<i32> {
-    revision.map(|revision| i32::try_from(revision).unwrap_or(i32::MAX))
 }

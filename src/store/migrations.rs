@@ -23,7 +23,8 @@ pub(super) fn embedded<Files: RustEmbed>() -> Migrator {
     Migrator::with_migrations(Files::iter().filter_map(|name| of(&name)).collect())
 }
 
-/// Reads a struct from the columns of a row that are called as its fields; `as` says as what a number is kept.
+/// Reads a struct from the columns of a row of either database that are called as its fields; `as` says as what a number is
+/// kept.
 macro_rules! from_row {
     (@column $row:ident, $field:ident) => {
         sqlx::Row::try_get($row, stringify!($field))?
@@ -31,11 +32,15 @@ macro_rules! from_row {
     (@column $row:ident, $field:ident as $kept:ty) => {
         sqlx::Row::try_get::<$kept, _>($row, stringify!($field))?.try_into().map_err(|error| sqlx::Error::Decode(Box::new(error)))?
     };
-    ($row:ty => $name:ident { $($field:ident $(as $kept:ty)?),* $(,)? }) => {
+    (@of $row:ty, $name:ident { $($field:ident $(as $kept:ty)?),* }) => {
         impl<'r> sqlx::FromRow<'r, $row> for $name {
             fn from_row(row: &'r $row) -> Result<Self, sqlx::Error> {
                 Ok(Self { $($field: from_row!(@column row, $field $(as $kept)?)),* })
             }
         }
+    };
+    ($name:ident { $($field:ident $(as $kept:ty)?),* $(,)? }) => {
+        from_row!(@of sqlx::sqlite::SqliteRow, $name { $($field $(as $kept)?),* });
+        from_row!(@of sqlx::postgres::PgRow, $name { $($field $(as $kept)?),* });
     };
 }

@@ -5,11 +5,9 @@
 //! and sequences have no gap.
 
 use futures_util::future::BoxFuture;
-use sqlx::postgres::PgRow;
-use sqlx::sqlite::SqliteRow;
 
 use super::StoreError;
-use super::callbacks::NewCallback;
+use super::callbacks::{Callback, NewCallback};
 use super::documents::NewDocument;
 use super::quota::{Quota, Usage};
 
@@ -22,8 +20,7 @@ pub struct Head {
     pub state: Option<String>,
 }
 
-from_row!(SqliteRow => Head { sequence, state });
-from_row!(PgRow => Head { sequence, state });
+from_row!(Head { sequence, state });
 
 /// What happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,10 +76,9 @@ pub struct Entry {
     pub said: String,
     /// When, ms since 1970, UTC.
     pub created_ms: i64,
+    /// What has become of the callback that tells of it.
+    pub callback: Option<Callback>,
 }
-
-from_row!(SqliteRow => Entry { sequence, kind, part, revision as i32, number, content, said, created_ms });
-from_row!(PgRow => Entry { sequence, kind, part, revision as i32, number, content, said, created_ms });
 
 /// A part as it is now.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -105,8 +101,7 @@ pub struct KeptPart {
     pub created_ms: i64,
 }
 
-from_row!(SqliteRow => KeptPart { part, number, sequence, revision as i32, content, said, now, created_ms });
-from_row!(PgRow => KeptPart { part, number, sequence, revision as i32, content, said, now, created_ms });
+from_row!(KeptPart { part, number, sequence, revision as i32, content, said, now, created_ms });
 
 /// An entry to be added.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,8 +3,6 @@
 use std::io;
 
 use bytes::Bytes;
-use sqlx::QueryBuilder;
-use sqlx::sqlite::{Sqlite, SqliteConnection, SqliteRow};
 use zstd::zstd_safe::CParameter;
 
 use super::KeptResult;
@@ -56,7 +54,7 @@ pub(super) struct ResultRow {
     pub(super) records: String,
 }
 
-from_row!(SqliteRow => ResultRow { key, calculator, version, engine, input, body, checksum, records });
+from_row!(ResultRow { key, calculator, version as i32, engine, input, body, checksum, records });
 
 impl ResultRow {
     /// What it takes of the disk, about.
@@ -91,25 +89,4 @@ impl ResultRow {
         }
         *hasher.finalize().as_bytes()
     }
-}
-
-/// Adds rows in one statement, those that are there already excepted; what the others take, bytes.
-pub(super) async fn insert(
-    rows: &[ResultRow],
-    now_ms: i64,
-    connection: &mut SqliteConnection,
-) -> Result<i64, sqlx::Error> {
-    let mut statement = QueryBuilder::<Sqlite>::new(
-        "INSERT INTO results (key, calculator, version, engine, input, body, checksum, bytes, created_ms, used_ms, records) ",
-    );
-    statement.push_values(rows, |mut values, row| {
-        values.push_bind(&row.key).push_bind(&row.calculator).push_bind(row.version).push_bind(&row.engine);
-        values.push_bind(&row.input).push_bind(&row.body).push_bind(&row.checksum);
-        values.push_bind(row.bytes()).push_bind(now_ms).push_bind(now_ms).push_bind(&row.records);
-    });
-    statement.push(" ON CONFLICT (key) DO NOTHING");
-    let done = statement.build().execute(connection).await?;
-    let bytes: i64 = rows.iter().map(ResultRow::bytes).sum();
-    // Where some were there already, the total is a little too large until eviction counts anew.
-    Ok(if done.rows_affected() == 0 { 0 } else { bytes })
 }

@@ -10,16 +10,17 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteRow, SqliteSynchronous,
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{Connection, QueryBuilder, Sqlite};
+use sqlx::{Connection, Sqlite};
 
 use super::OpenError;
+use super::common::results;
 use super::ledger::Ledger;
-use super::row::ResultRow;
+use super::sql::{Outcome, Reads, Writes};
 use super::sqlite_jobs;
 use super::writer::{LIST_PATIENCE, Limits, Writer};
-use super::{Cursor, KeptResult, Origin, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
+use super::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError};
 use crate::key::Key;
 
 #[derive(rust_embed::RustEmbed)]
@@ -144,13 +145,8 @@ impl SqliteStore {
         if !self.keys.may_have(&key) {
             return Ok(None);
         }
-        let row: Option<ResultRow> = sqlx::query_as(
-            "SELECT key, calculator, version, engine, input, body, checksum, records FROM results WHERE key = ?1",
-        )
-        .bind(key.as_bytes().as_slice())
-        .fetch_optional(&self.readers)
-        .await
-        .inspect_err(|error| {
+        let mut reader = self.readers.acquire().await?;
+        let row = results::row(&mut *reader, key).await.inspect_err(|error| {
             tracing::warn!(%key, %error, "a kept result cannot be read");
             metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
         })?;
@@ -165,69 +161,6 @@ impl SqliteStore {
         }
         Ok(result)
     }
-
-    async fn page(&self, query: ResultQuery) -> Result<ResultPage, StoreError> {
-        self.writer.flush(LIST_PATIENCE).await;
-        let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
-        let after = query.after.map(|cursor| (cursor.created_ms, cursor.key.as_bytes().to_vec()));
-        let (created_ms, key) = after.unwrap_or((i64::MAX, vec![0xff; 32]));
-        let index = match (&query.record, &query.calculator) {
-            (Some(_), _) => "results_with_records",
-            (None, Some(_)) => "results_by_calculator",
-            (None, None) => "results_by_time",
-        };
-        let mut statement = QueryBuilder::<Sqlite>::new(
-            "SELECT key, calculator, version, engine, bytes, created_ms FROM results INDEXED BY ",
-        );
-        statement.push(index).push(" WHERE (created_ms, key) < (").push_bind(created_ms);
-        statement.push(", ").push_bind(key).push(")");
-        if let Some(calculator) = query.calculator {
-            statement.push(" AND calculator = ").push_bind(calculator);
-        }
-        narrow(&mut statement, query.owner, query.record);
-        // One more than asked for tells whether there is another page.
-        statement.push(" ORDER BY created_ms DESC, key DESC LIMIT ").push_bind(limit + 1);
-        let rows: Vec<SummaryRow> = statement.build_query_as().fetch_all(&self.readers).await?;
-        let mut items: Vec<ResultSummary> = rows.into_iter().filter_map(SummaryRow::summary).collect();
-        let more = items.len() > limit as usize;
-        items.truncate(limit as usize);
-        let next = items.last().filter(|_| more).map(|last| Cursor { created_ms: last.created_ms, key: last.key });
-        Ok(ResultPage { items, next })
-    }
-
-    async fn count(&self, record: String, owner: Option<String>) -> Result<u64, StoreError> {
-        self.writer.flush(LIST_PATIENCE).await;
-        let mut statement =
-            QueryBuilder::<Sqlite>::new("SELECT count(*) FROM results INDEXED BY results_with_records WHERE true");
-        narrow(&mut statement, owner, Some(record));
-        let count: i64 = statement.build_query_scalar().fetch_one(&self.readers).await?;
-        Ok(u64::try_from(count).unwrap_or(0))
-    }
-
-    async fn some_inputs(&self, keys: Vec<Key>, most: usize) -> Result<Vec<(Key, Bytes)>, StoreError> {
-        let mut statement = QueryBuilder::<Sqlite>::new("SELECT key, input FROM results WHERE length(input) <= ");
-        statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND key IN (");
-        let mut places = statement.separated(", ");
-        for key in keys {
-            places.push_bind(key.as_bytes().to_vec());
-        }
-        statement.push(")");
-        let rows: Vec<(Vec<u8>, Vec<u8>)> = statement.build_query_as().fetch_all(&self.readers).await?;
-        Ok(rows.into_iter().filter_map(|(key, input)| Some((Key::from_bytes(&key)?, input.into()))).collect())
-    }
-}
-
-/// Only results that an owner has asked for, and whose jobs got a record.
-fn narrow(statement: &mut QueryBuilder<Sqlite>, owner: Option<String>, record: Option<String>) {
-    if let Some(owner) = owner {
-        let of = "EXISTS (SELECT 1 FROM asked WHERE asked.key = results.key AND asked.owner = ";
-        statement.push(" AND (").push(of).push_bind(owner.clone());
-        let of = ") OR EXISTS (SELECT 1 FROM precut_jobs AS job WHERE job.key = results.key AND job.owner = ";
-        statement.push(of).push_bind(owner).push("))");
-    }
-    if let Some(record) = record {
-        statement.push(" AND records <> '' AND instr(records, ").push_bind(ResultQuery::mark(&record)).push(") > 0");
-    }
 }
 
 impl ResultStore for SqliteStore {
@@ -238,53 +171,34 @@ impl ResultStore for SqliteStore {
         self.writer.put(result);
     }
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
-        Box::pin(self.page(query))
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            Ok(results::page(&mut *self.reader().await?, query).await?)
+        })
     }
     fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
-        Box::pin(self.count(record, owner))
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            Ok(results::uses(&mut *self.reader().await?, record, owner).await?)
+        })
     }
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.ledger.write(move |connection| {
+        self.write(move |connection| {
             let owner = owner.clone();
-            Box::pin(async move {
-                sqlx::query("INSERT OR IGNORE INTO asked (key, owner) VALUES (?1, ?2)")
-                    .bind(key.as_bytes().as_slice())
-                    .bind(owner)
-                    .execute(connection)
-                    .await?;
-                Ok(())
-            })
-        }))
+            Box::pin(async move { results::note_asked(connection, key, &owner).await })
+        })
     }
     fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(async move {
-            let asked = sqlx::query_scalar(
-                "SELECT EXISTS (SELECT 1 FROM asked WHERE key = ?1 AND owner = ?2)
-                     OR EXISTS (SELECT 1 FROM precut_jobs WHERE key = ?1 AND owner = ?2)",
-            );
-            Ok(asked.bind(key.as_bytes().as_slice()).bind(owner).fetch_one(&self.readers).await?)
-        })
+        Box::pin(async move { Ok(results::has_asked(&mut *self.reader().await?, key, &owner).await?) })
     }
     fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
         Box::pin(async move {
             self.writer.flush(LIST_PATIENCE).await;
-            let created_ms = sqlx::query_scalar("SELECT created_ms FROM results WHERE key = ?1")
-                .bind(key.as_bytes().as_slice())
-                .fetch_optional(&self.readers)
-                .await?;
-            let asked_by = sqlx::query_scalar(
-                "SELECT owner FROM asked WHERE key = ?1 AND (?3 IS NULL OR owner = ?3) ORDER BY owner LIMIT ?2",
-            )
-            .bind(key.as_bytes().as_slice())
-            .bind(Origin::MOST)
-            .bind(owner)
-            .fetch_all(&self.readers)
-            .await?;
-            Ok(Origin { created_ms, asked_by })
+            Ok(results::origin(&mut *self.reader().await?, key, owner).await?)
         })
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
-        Box::pin(self.some_inputs(keys, most))
+        Box::pin(async move { Ok(results::inputs(&mut *self.reader().await?, &keys, most).await?) })
     }
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async {
@@ -312,27 +226,47 @@ impl ResultStore for SqliteStore {
     }
 }
 
-struct SummaryRow {
-    key: Vec<u8>,
-    calculator: String,
-    version: u32,
-    engine: String,
-    bytes: i64,
-    created_ms: i64,
+impl Reads for SqliteStore {
+    type Database = Sqlite;
+    fn readers(&self) -> &SqlitePool {
+        &self.readers
+    }
 }
 
-from_row!(SqliteRow => SummaryRow { key, calculator, version, engine, bytes, created_ms });
+impl Writes for SqliteStore {
+    fn write<T: Send + 'static>(
+        &self,
+        work: impl for<'c> Fn(&'c mut SqliteConnection) -> BoxFuture<'c, Outcome<T>> + Send + Sync + 'static,
+    ) -> BoxFuture<'_, Result<T, StoreError>> {
+        Box::pin(self.ledger.write(work))
+    }
+}
 
-impl SummaryRow {
-    fn summary(self) -> Option<ResultSummary> {
-        Some(ResultSummary {
-            key: Key::from_bytes(&self.key)?,
-            calculator: self.calculator,
-            version: self.version,
-            engine: self.engine,
-            bytes: u64::try_from(self.bytes).unwrap_or(0),
-            created_ms: self.created_ms,
-        })
+/// The documents in the database of a data folder, for reading: whoever serves from the folder is not disturbed.
+pub(crate) struct SqliteShelf(SqlitePool);
+
+impl SqliteShelf {
+    pub(crate) async fn open(folder: &Path) -> Result<Self, OpenError> {
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join(DATABASE))
+            .create_if_missing(false)
+            .busy_timeout(BUSY_TIMEOUT)
+            .pragma("query_only", "ON");
+        let opened = SqlitePoolOptions::new().max_connections(1).acquire_timeout(BUSY_TIMEOUT).connect_with(options);
+        let unusable =
+            |error: sqlx::Error| OpenError::Unusable { folder: folder.to_owned(), reason: error.to_string() };
+        opened.await.map(Self).map_err(unusable)
+    }
+
+    pub(crate) async fn close(self) {
+        self.0.close().await;
+    }
+}
+
+impl Reads for SqliteShelf {
+    type Database = Sqlite;
+    fn readers(&self) -> &SqlitePool {
+        &self.0
     }
 }
 

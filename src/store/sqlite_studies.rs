@@ -36,13 +36,11 @@ impl SqliteStore {
                     .await?;
                     // Whoever gets on is not to blame for the end of its processes: what is put down is not computed
                     // again, so that this cannot go on for ever.
-                    sqlx::query(
-                        "UPDATE precut_jobs SET attempt = ?2 WHERE key = ?1 AND state = 'running' AND attempt > ?2",
-                    )
-                    .bind(study.as_bytes().as_slice())
-                    .bind(MOST_ATTEMPTS - 1)
-                    .execute(connection)
-                    .await?;
+                    sqlx::query("UPDATE jobs SET attempt = ?2 WHERE key = ?1 AND state = 'running' AND attempt > ?2")
+                        .bind(study.as_bytes().as_slice())
+                        .bind(MOST_ATTEMPTS - 1)
+                        .execute(connection)
+                        .await?;
                     Ok(())
                 })
             })

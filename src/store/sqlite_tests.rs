@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
+use crate::store::Cursor;
 use tempfile::TempDir;
 
 const AGE: Duration = Duration::from_hours(1);

@@ -11,7 +11,8 @@ use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use tokio::sync::{Mutex, Notify, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
-use super::row::{self, Packer, ResultRow};
+use super::common::results;
+use super::row::{Packer, ResultRow};
 use super::sqlite::Keys;
 use super::{KeptResult, now_ms};
 use crate::key::Key;
@@ -300,7 +301,7 @@ impl Clerk {
                      SELECT key FROM (
                          SELECT key, sum(bytes) OVER (ORDER BY used_ms, key) - bytes AS before
                          FROM (SELECT key, used_ms, bytes FROM results INDEXED BY results_by_use
-                               WHERE NOT EXISTS (SELECT 1 FROM precut_jobs WHERE precut_jobs.key = results.key
+                               WHERE NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.key = results.key
                                                  AND state = 'succeeded' AND expires_ms > ?3)
                                ORDER BY used_ms, key LIMIT ?2))
                      WHERE before < ?1)
@@ -337,7 +338,7 @@ impl Clerk {
             let deleted: Vec<(Vec<u8>, i64)> = sqlx::query_as(
                 "DELETE FROM results WHERE key IN (
                      SELECT key FROM results INDEXED BY results_by_use WHERE used_ms < ?1
-                         AND NOT EXISTS (SELECT 1 FROM precut_jobs WHERE precut_jobs.key = results.key
+                         AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.key = results.key
                                          AND state = 'succeeded' AND expires_ms > ?3) LIMIT ?2)
                  RETURNING key, bytes",
             )
@@ -387,10 +388,10 @@ async fn insert(
     let mut added = 0;
     let (many, few) = rows.as_chunks::<ROWS_AT_ONCE>();
     for rows in many {
-        added += row::insert(rows, now, &mut transaction).await?;
+        added += results::insert(&mut *transaction, rows, now).await?;
     }
     for one in few {
-        added += row::insert(std::slice::from_ref(one), now, &mut transaction).await?;
+        added += results::insert(&mut *transaction, std::slice::from_ref(one), now).await?;
     }
     for key in touched {
         sqlx::query("UPDATE results SET used_ms = ?2 WHERE key = ?1")

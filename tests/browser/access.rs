@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::chromium::Page;
 use crate::service::Service;
+use crate::sizes::{pane, speak};
 use crate::{SETTLED, both};
 
 /// Version 4.14.1, see its folder.
@@ -132,27 +133,24 @@ fn no_word_is_broken_and_no_page_ends_in_emptiness() {
             const lines = new Set([...range.getClientRects()].filter(box => box.width > 0.5).map(box => Math.round(box.top))); \
             if (lines.size > 1) broken.add(word[0]); } } \
         return [...broken] })()";
-    for (width, height) in [(360, 740), (1024, 600), (1440, 900)] {
-        page.screen(width, height, false);
-        for language in ["EN", "RU"] {
-            page.open(&service.page(""));
-            page.click_on(language);
-            page.until(&format!("document.documentElement.lang === '{}'", language.to_lowercase()));
-            for room in &rooms {
-                page.open(&service.page(room));
+    for room in &rooms {
+        page.open(&service.page(room));
+        for (width, height) in [(360, 740), (1024, 600), (1440, 900)] {
+            page.screen(width, height, false);
+            for language in ["en", "ru"] {
+                speak(&mut page, language);
                 page.until(SETTLED);
                 page.wait_for(".value-table");
                 assert_eq!(page.evaluate(broken), json!([]), "{room} at {width}, {language}");
                 let below = "document.documentElement.scrollHeight - Math.max(innerHeight, Math.round(document.querySelector('.result-pane').getBoundingClientRect().bottom + scrollY))";
                 assert_eq!(page.evaluate(&format!("{below} <= 2")), true, "{room} at {width}, {language}");
-                if width < 861 {
-                    page.click(".pane-switch button");
-                }
+                pane(&mut page, "form");
                 page.evaluate(
                     "document.querySelectorAll('.fold-head button[aria-expanded=false]').forEach(it => it.click())",
                 );
                 page.until("!document.querySelector('.fold-head button[aria-expanded=false]')");
                 assert_eq!(page.evaluate(broken), json!([]), "form of {room} at {width}, {language}");
+                pane(&mut page, "picture");
             }
         }
     }

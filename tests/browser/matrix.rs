@@ -4,22 +4,13 @@ use serde_json::json;
 
 use crate::access::rooms;
 use crate::chromium::Page;
-use crate::sizes::{assert_fits, at_sizes, fits};
+use crate::sizes::{assert_fits, at_sizes, fits, pane};
 use crate::{SETTLED, both};
 
 /// A shaft with steps, a rest and a table of segments.
 const SHAFT: &str = "deflection-compensation?example=stepped_with_rest";
 const CELL: &str = "#field-shaft-segments-0-diameter_mm";
 const CURRENT: &str = "!document.querySelector('.not-theirs')";
-
-/// Which of the two panes of a phone is shown.
-fn pane(page: &mut Page, name: &str) {
-    let press = format!(
-        "(() => {{ const room = document.querySelector('main.room'); if (room.dataset.pane !== '{name}') document.querySelector(`.pane-switch button:nth-child(${{'{name}' === 'form' ? 1 : 2}})`).click() }})()"
-    );
-    page.evaluate(&press);
-    page.until(&format!("document.querySelector('main.room').dataset.pane === '{name}'"));
-}
 
 /// Types into a field, also where the pane with it is not shown.
 fn typed(page: &mut Page, field: &str, text: &str) {

@@ -41,3 +41,12 @@ pub fn fits(page: &mut Page, place: &str) {
     page.until("document.documentElement.scrollWidth <= innerWidth");
     assert_accessible(page, place);
 }
+
+/// Which of the two panes of a phone is shown.
+pub fn pane(page: &mut Page, name: &str) {
+    let press = format!(
+        "(() => {{ const room = document.querySelector('main.room'); if (room.dataset.pane !== '{name}') document.querySelector(`.pane-switch button:nth-child(${{'{name}' === 'form' ? 1 : 2}})`).click() }})()"
+    );
+    page.evaluate(&press);
+    page.until(&format!("document.querySelector('main.room').dataset.pane === '{name}'"));
+}

@@ -162,7 +162,7 @@ async fn where_files_may_not_grow_answers_go_on_and_jobs_are_refused() {
     }
     println!("files limited: {} jobs accepted and done, {refused} refused", accepted.len());
     let mut database = database(folder.path()).await;
-    let on_record: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs").fetch_one(&mut database).await.unwrap();
+    let on_record: i64 = sqlx::query_scalar("SELECT count(*) FROM jobs").fetch_one(&mut database).await.unwrap();
     assert_eq!(usize::try_from(on_record).unwrap(), accepted.len(), "what was refused is not on record");
     service.stop();
 }

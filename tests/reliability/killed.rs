@@ -99,13 +99,12 @@ async fn killed_at_random_moments_no_job_is_lost_or_done_twice() {
     }
     assert_intact(folder.path()).await;
     let mut database = database(folder.path()).await;
-    let ended: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = 'succeeded'")
+    let ended: i64 = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 'succeeded'")
         .fetch_one(&mut database)
         .await
         .unwrap();
-    let all: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs").fetch_one(&mut database).await.unwrap();
-    let keys: i64 =
-        sqlx::query_scalar("SELECT count(DISTINCT key) FROM precut_jobs").fetch_one(&mut database).await.unwrap();
+    let all: i64 = sqlx::query_scalar("SELECT count(*) FROM jobs").fetch_one(&mut database).await.unwrap();
+    let keys: i64 = sqlx::query_scalar("SELECT count(DISTINCT key) FROM jobs").fetch_one(&mut database).await.unwrap();
     let results: i64 = sqlx::query_scalar("SELECT count(*) FROM results").fetch_one(&mut database).await.unwrap();
     println!("on record: {all} jobs, {ended} succeeded, {keys} keys, {results} results");
     let jobs = i64::from(jobs);
@@ -150,7 +149,7 @@ async fn a_job_that_is_killed_three_times_is_done_all_the_same_and_once() {
     assert_intact(folder.path()).await;
     let mut database = database(folder.path()).await;
     let count = |what: &'static str| sqlx::query_scalar::<_, i64>(what);
-    let ended = count("SELECT count(*) FROM precut_jobs WHERE state = 'succeeded'").fetch_one(&mut database).await;
+    let ended = count("SELECT count(*) FROM jobs WHERE state = 'succeeded'").fetch_one(&mut database).await;
     let results = count("SELECT count(*) FROM results").fetch_one(&mut database).await;
     println!("{victims} jobs killed three times each ({kills} kills): all succeeded; starts of each: {attempts:?}");
     assert_eq!((ended.unwrap(), results.unwrap()), (i64::from(victims), i64::from(victims)));
@@ -162,7 +161,7 @@ async fn wait_for_all(folder: &Path) {
     let mut left = i64::MAX;
     while left > 0 {
         left = until("the line to get on", async || {
-            let open = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE finished_ms IS NULL");
+            let open = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE finished_ms IS NULL");
             let open: i64 = open.fetch_one(&mut database).await.unwrap();
             (open < left).then_some(open)
         })
@@ -248,7 +247,7 @@ async fn a_study_that_gets_on_is_finished_however_often_its_process_is_killed() 
     let count = async |database: &mut sqlx::SqliteConnection, what: &'static str| -> i64 {
         sqlx::query_scalar(what).fetch_one(database).await.unwrap()
     };
-    let jobs = count(&mut database, "SELECT count(*) FROM precut_jobs WHERE state = 'succeeded'").await;
+    let jobs = count(&mut database, "SELECT count(*) FROM jobs WHERE state = 'succeeded'").await;
     let results = count(&mut database, "SELECT count(*) FROM results").await;
     let left = count(&mut database, "SELECT count(*) FROM studies").await;
     println!(

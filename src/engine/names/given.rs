@@ -17,7 +17,7 @@ use crate::engine::read::{Draft, Ready};
 use crate::engine::{Body, Error, Form, ModelFile, RecordError, Shelf, entry};
 use crate::registry::{Entry, Registry, canonical};
 use crate::store::documents::{DocumentShelf, KeptDocument, Kind, Revisions, Title};
-use crate::store::sqlite_documents::SqliteShelf;
+use crate::store::sqlite::SqliteShelf;
 use crate::store::{OpenError, StoreError};
 
 /// What names in a job mean that is solved without a service: those of the engine's own records alone, unless more is given.

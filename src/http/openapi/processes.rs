@@ -177,7 +177,7 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
         "ProcessEntry",
         json!({
             "type": "object", "description": "Something that happened to a process.",
-            "required": ["sequence", "kind", "revision", "created_at", "sent", "said"],
+            "required": ["sequence", "kind", "revision", "created_at", "sent", "said", "callback"],
             "properties": {
                 "sequence": count("Its number, without a gap.", 41),
                 "kind": { "type": "string", "enum": ["document", "part", "withdrawn", "decision", "path"], "description": "What it is.", "examples": ["part"] },
@@ -185,6 +185,7 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
                 "revision": count("Of the document, the part or the path.", 1), "created_at": time,
                 "sent": { "description": "What came.", "oneOf": [{ "type": "null" }, reference("ProcessSent")] },
                 "said": { "description": "What was said then; it never changes.", "oneOf": [{ "type": "null" }, reference("ProcessSaid")] },
+                "callback": { "description": "What has become of the callback that tells of it; null where nobody is told.", "oneOf": [{ "type": "null" }, reference("Callback")] },
             },
         }),
     );

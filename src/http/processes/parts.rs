@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use super::super::auth::Caller;
 use super::super::problem::Problem;
 use super::super::query::Query;
-use super::super::{App, body, gate, negotiate};
+use super::super::{App, body, callbacks, gate, negotiate};
 use super::{DEFAULT_ITEMS, MOST_ITEMS, MOST_NUMBER, answered, located, precondition, tagged, time};
 use crate::engine::{Body, PartAnswer, PartOutcome, ProcessError, in_language, parsed};
 use crate::store::processes::{Entry, KeptPart};
@@ -56,6 +56,7 @@ fn entry(entry: &Entry, language: Language) -> Value {
         "created_at": time(entry.created_ms),
         "sent": value(&entry.content),
         "said": said_in(&entry.said, language),
+        "callback": entry.callback.as_ref().map(|callback| callbacks::document(callback, time)),
     })
 }
 

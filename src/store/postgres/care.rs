@@ -2,14 +2,14 @@
 
 use sqlx::postgres::{PgConnection, PgPool};
 
-use super::record::{Outcome, column, count, ids, texts};
-use super::run::{requeue, unwanted};
-use super::usage::forget_work;
-use super::{PostgresStore, lock, news};
+use super::run::requeue;
+use super::{PostgresStore, lock, news, texts};
 use crate::key::Key;
 use crate::store::StoreError;
-use crate::store::jobs::{Changed, JobId, Lease, Live, Timing};
-use crate::store::sqlite_jobs::record::parsed;
+use crate::store::common::jobs::{ids, parsed, unwanted};
+use crate::store::common::usage::forget_work;
+use crate::store::jobs::{Changed, JobId, Lease, Live};
+use crate::store::sql::Outcome;
 
 /// Timings kept.
 const TIMINGS: i64 = 20_000;
@@ -42,8 +42,8 @@ async fn is_first(connection: &mut PgConnection, duty: Duty) -> Outcome<bool> {
 impl PostgresStore {
     pub(super) async fn expire(&self, problem: &str) -> Result<(Changed, Option<i64>), StoreError> {
         let keys: Vec<Vec<u8>> = sqlx::query_scalar(
-            "SELECT DISTINCT key FROM precut.jobs
-             WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running') AND deadline_ms <= precut.now_ms()",
+            "SELECT DISTINCT key FROM jobs
+             WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running') AND deadline_ms <= now_ms()",
         )
         .fetch_all(&self.pool)
         .await?;
@@ -58,7 +58,7 @@ impl PostgresStore {
             all.unwanted.extend(changed.unwanted);
         }
         let next = sqlx::query_scalar(
-            "SELECT min(deadline_ms) FROM precut.jobs WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running')",
+            "SELECT min(deadline_ms) FROM jobs WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running')",
         )
         .fetch_one(&self.pool)
         .await?;
@@ -88,7 +88,7 @@ impl PostgresStore {
     /// Says that this process runs jobs of its version.
     async fn say_alive(&self) -> Result<(), StoreError> {
         sqlx::query(
-            "INSERT INTO precut.workers (id, engine, seen_ms) VALUES ($1, $2, precut.now_ms())
+            "INSERT INTO workers (id, engine, seen_ms) VALUES ($1, $2, now_ms())
              ON CONFLICT (id) DO UPDATE SET seen_ms = excluded.seen_ms",
         )
         .bind(self.held.name())
@@ -117,9 +117,9 @@ impl PostgresStore {
 async fn expire_key(connection: &mut PgConnection, key: Key, problem: &str, keep_ms: i64) -> Outcome<Changed> {
     let now = lock(connection, &key).await?;
     let late: Vec<(String, Option<String>)> = sqlx::query_as(
-        "WITH late AS (SELECT id, lease FROM precut.jobs
+        "WITH late AS (SELECT id, lease FROM jobs
                        WHERE key = $1 AND deadline_ms <= $2 AND state IN ('queued', 'running'))
-         UPDATE precut.jobs AS job SET state = 'failed', problem = $3, lease = NULL, heartbeat_ms = NULL, stage = NULL,
+         UPDATE jobs AS job SET state = 'failed', problem = $3, lease = NULL, heartbeat_ms = NULL, stage = NULL,
              finished_ms = $2, expires_ms = $2 + $4
          FROM late WHERE job.id = late.id RETURNING job.id, late.lease",
     )
@@ -130,7 +130,8 @@ async fn expire_key(connection: &mut PgConnection, key: Key, problem: &str, keep
     .fetch_all(&mut *connection)
     .await?;
     let jobs = late.iter().map(|(id, _)| parsed(id)).collect::<Outcome<Vec<JobId>>>()?;
-    let leases: Vec<String> = late.into_iter().filter_map(|(_, lease)| lease).collect();
+    let leases = late.iter().filter_map(|(_, lease)| lease.as_ref());
+    let leases = leases.map(|lease| parsed(lease)).collect::<Outcome<Vec<Lease>>>()?;
     let unwanted = unwanted(connection, &leases).await?;
     news::tell(connection, &jobs, &unwanted).await?;
     Ok(Changed { jobs, unwanted })
@@ -147,8 +148,8 @@ async fn stale(
         return Ok(None);
     }
     let stale: Vec<String> = sqlx::query_scalar(
-        "SELECT DISTINCT lease FROM precut.jobs
-         WHERE state = 'running' AND heartbeat_ms <= precut.now_ms() - $1 AND NOT lease = ANY($2)
+        "SELECT DISTINCT lease FROM jobs
+         WHERE state = 'running' AND heartbeat_ms <= now_ms() - $1 AND NOT lease = ANY($2)
              AND clock_timestamp() - pg_postmaster_start_time() > make_interval(secs => $3)
          LIMIT $4",
     )
@@ -165,7 +166,7 @@ async fn stale(
 /// jobs wait for its workers: there may be something in them that this one cannot read.
 async fn adopt(pool: &PgPool, mine: &str) -> Outcome<Vec<JobId>> {
     let engines: Vec<String> =
-        sqlx::query_scalar("SELECT DISTINCT engine FROM precut.jobs WHERE state = 'queued' AND engine <> $1")
+        sqlx::query_scalar("SELECT DISTINCT engine FROM jobs WHERE state = 'queued' AND engine <> $1")
             .bind(mine)
             .fetch_all(pool)
             .await?;
@@ -173,18 +174,17 @@ async fn adopt(pool: &PgPool, mine: &str) -> Outcome<Vec<JobId>> {
     if older.is_empty() {
         return Ok(Vec::new());
     }
-    let served: Vec<String> =
-        sqlx::query_scalar("SELECT DISTINCT engine FROM precut.workers WHERE seen_ms > precut.now_ms() - $1")
-            .bind(DESERTED_MS)
-            .fetch_all(pool)
-            .await?;
+    let served: Vec<String> = sqlx::query_scalar("SELECT DISTINCT engine FROM workers WHERE seen_ms > now_ms() - $1")
+        .bind(DESERTED_MS)
+        .fetch_all(pool)
+        .await?;
     if !served.iter().any(|engine| engine == mine) {
         return Ok(Vec::new());
     }
     let deserted: Vec<String> = older.into_iter().filter(|engine| !served.contains(engine)).collect();
     let taken_over: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs SET engine = $1 WHERE id IN (
-             SELECT id FROM precut.jobs WHERE state = 'queued' AND engine = ANY($2) FOR UPDATE SKIP LOCKED)
+        "UPDATE jobs SET engine = $1 WHERE id IN (
+             SELECT id FROM jobs WHERE state = 'queued' AND engine = ANY($2) FOR UPDATE SKIP LOCKED)
          RETURNING id",
     )
     .bind(mine)
@@ -211,70 +211,38 @@ async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
     forget_work(connection).await?;
     // First the input, then, much later, the record: that a job was there is known longer than what it gave.
     sqlx::query(
-        "UPDATE precut.jobs SET input = '', idempotency = NULL, body_hash = NULL
-         WHERE id IN (SELECT id FROM precut.jobs WHERE expires_ms <= precut.now_ms() AND length(input) > 0 LIMIT $1)",
+        "UPDATE jobs SET input = '', idempotency = NULL, body_hash = NULL
+         WHERE id IN (SELECT id FROM jobs WHERE expires_ms <= now_ms() AND length(input) > 0 LIMIT $1)",
     )
     .bind(FORGOTTEN_AT_ONCE)
     .execute(&mut *connection)
     .await?;
     let gone = sqlx::query(
-        "DELETE FROM precut.jobs
-         WHERE id IN (SELECT id FROM precut.jobs WHERE expires_ms <= precut.now_ms() - $1 LIMIT $2)",
+        "DELETE FROM jobs
+         WHERE id IN (SELECT id FROM jobs WHERE expires_ms <= now_ms() - $1 LIMIT $2)",
     )
     .bind(keep_ms)
     .bind(FORGOTTEN_AT_ONCE)
     .execute(&mut *connection)
     .await?;
-    sqlx::query("DELETE FROM precut.workers WHERE seen_ms < precut.now_ms() - $1")
+    sqlx::query("DELETE FROM workers WHERE seen_ms < now_ms() - $1")
         .bind(GONE_FOR_MS)
         .execute(&mut *connection)
         .await?;
-    sqlx::query(
-        "DELETE FROM precut.timings WHERE at_ms < (SELECT at_ms FROM precut.timings ORDER BY at_ms DESC LIMIT 1 OFFSET $1)",
-    )
-    .bind(TIMINGS)
-    .execute(&mut *connection)
-    .await?;
+    sqlx::query("DELETE FROM timings WHERE at_ms < (SELECT at_ms FROM timings ORDER BY at_ms DESC LIMIT 1 OFFSET $1)")
+        .bind(TIMINGS)
+        .execute(&mut *connection)
+        .await?;
     // Parts of studies that no job waits for.
     for deserted in [
-        "DELETE FROM precut.shared_studies WHERE created_ms < precut.now_ms() - $1 AND NOT EXISTS (
-             SELECT FROM precut.jobs WHERE key = study AND state IN ('queued', 'running'))",
-        "DELETE FROM precut.studies WHERE created_ms < precut.now_ms() - $1 AND NOT EXISTS (
-             SELECT FROM precut.jobs WHERE key = study AND state IN ('queued', 'running'))",
+        "DELETE FROM shared_studies WHERE created_ms < now_ms() - $1 AND NOT EXISTS (
+             SELECT FROM jobs WHERE key = study AND state IN ('queued', 'running'))",
+        "DELETE FROM studies WHERE created_ms < now_ms() - $1 AND NOT EXISTS (
+             SELECT FROM jobs WHERE key = study AND state IN ('queued', 'running'))",
     ] {
         sqlx::query(deserted).bind(keep_ms).execute(&mut *connection).await?;
     }
     Ok(gone.rows_affected())
-}
-
-pub(super) async fn note_timing(pool: &PgPool, timing: &Timing) -> Outcome<()> {
-    sqlx::query(
-        "INSERT INTO precut.timings (calculator, version, predicted_ms, actual_ms, at_ms)
-         VALUES ($1, $2, $3, $4, precut.now_ms())",
-    )
-    .bind(&timing.calculator)
-    .bind(column(timing.version))
-    .bind(timing.predicted_ms)
-    .bind(timing.actual_ms)
-    .execute(pool)
-    .await?;
-    Ok(())
-}
-
-pub(super) async fn timings(pool: &PgPool, limit: u32) -> Outcome<Vec<Timing>> {
-    let rows: Vec<(String, i32, f64, f64)> = sqlx::query_as(
-        "SELECT calculator, version, predicted_ms, actual_ms FROM precut.timings ORDER BY at_ms DESC LIMIT $1",
-    )
-    .bind(i64::from(limit))
-    .fetch_all(pool)
-    .await?;
-    let timing = |(calculator, version, predicted_ms, actual_ms)| Timing {
-        calculator,
-        version: count(version),
-        predicted_ms,
-        actual_ms,
-    };
-    Ok(rows.into_iter().map(timing).collect())
 }
 
 #[cfg(test)]

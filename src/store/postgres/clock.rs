@@ -35,7 +35,7 @@ impl Clock {
     /// Reads the database's clock.
     pub(super) async fn read(&self, pool: &PgPool) -> Result<(), sqlx::Error> {
         let asked = self.local_ms();
-        let theirs: i64 = sqlx::query_scalar("SELECT precut.now_ms()").fetch_one(pool).await?;
+        let theirs: i64 = sqlx::query_scalar("SELECT now_ms()").fetch_one(pool).await?;
         self.set(theirs, asked);
         Ok(())
     }

@@ -2,21 +2,22 @@
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use sqlx::QueryBuilder;
-use sqlx::postgres::{PgConnection, Postgres};
+use sqlx::postgres::PgConnection;
 
-use super::PostgresStore;
-use super::care::{note_timing, timings};
 use super::line::submit;
-use super::record::{Outcome, RecordRow, column, columns, record};
 use super::run::{beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
-use super::usage::{kept_by_owner, note_work, usage};
-use super::{callbacks, news};
+use super::writer::LIST_PATIENCE;
+use super::{PostgresStore, callbacks, column, news};
 use crate::key::Key;
+use crate::store::common::callbacks::settle;
+use crate::store::common::jobs::{self, record};
+use crate::store::common::results;
+use crate::store::common::usage::{kept_by_owner, note_work, usage};
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, Hear, JobCounts, JobId, JobPage, JobQuery,
     JobRecord, JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
 };
+use crate::store::sql::{Outcome, Reads as _};
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
 use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
 
@@ -35,22 +36,31 @@ impl ResultStore for PostgresStore {
         self.writer.put(result);
     }
     fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
-        Box::pin(self.page(query))
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            Ok(results::page(&mut *self.reader().await?, query).await?)
+        })
     }
     fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
-        Box::pin(self.uses_of(record, owner))
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            Ok(results::uses(&mut *self.reader().await?, record, owner).await?)
+        })
     }
     fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.note_asked_in(key, owner))
+        Box::pin(async move { Ok(results::note_asked(&mut *self.reader().await?, key, &owner).await?) })
     }
     fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(self.has_asked_in(key, owner))
+        Box::pin(async move { Ok(results::has_asked(&mut *self.reader().await?, key, &owner).await?) })
     }
     fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
-        Box::pin(self.origin_of(key, owner))
+        Box::pin(async move {
+            self.writer.flush(LIST_PATIENCE).await;
+            Ok(results::origin(&mut *self.reader().await?, key, owner).await?)
+        })
     }
     fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
-        Box::pin(self.some_inputs(keys, most))
+        Box::pin(async move { Ok(results::inputs(&mut *self.reader().await?, &keys, most).await?) })
     }
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(async {
@@ -109,34 +119,6 @@ impl PostgresStore {
         Ok(ended)
     }
 
-    async fn list_jobs(&self, query: JobQuery) -> Result<JobPage, StoreError> {
-        let mut statement =
-            QueryBuilder::<Postgres>::new(concat!("SELECT ", columns!(), " FROM precut.jobs WHERE true"));
-        if let Some(state) = query.state {
-            statement.push(" AND state = ").push_bind(state.word());
-        }
-        if let Some(calculator) = query.calculator {
-            statement.push(" AND calculator = ").push_bind(calculator);
-        }
-        if let Some(owner) = query.owner {
-            statement.push(" AND owner = ").push_bind(owner);
-        }
-        if let Some(key) = query.key {
-            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
-        }
-        if let Some(before) = query.before {
-            statement.push(" AND id < ").push_bind(before.to_string());
-        }
-        // One more than asked for tells whether there is another page.
-        statement.push(" ORDER BY id DESC LIMIT ").push_bind(i64::from(query.limit) + 1);
-        let rows: Vec<RecordRow> = statement.build_query_as().fetch_all(&self.pool).await?;
-        let mut items = rows.into_iter().map(RecordRow::record).collect::<Outcome<Vec<_>>>()?;
-        let more = items.len() > query.limit as usize;
-        items.truncate(query.limit as usize);
-        let next = items.last().filter(|_| more).map(|last| last.id);
-        Ok(JobPage { items, next })
-    }
-
     async fn help(&self, key: Key, most: u32) -> Result<(), StoreError> {
         let engine = self.engine.clone();
         self.write(|connection| Box::pin(call(connection, key, most, engine))).await
@@ -146,9 +128,9 @@ impl PostgresStore {
 /// Asks for help with the job that is computed under a key.
 async fn call(connection: &mut PgConnection, key: Key, most: u32, engine: String) -> Outcome<()> {
     sqlx::query(
-        "UPDATE precut.jobs SET help = least(help + $2, $3, $4 * (
-             SELECT count(*) FROM precut.workers WHERE engine = $5 AND seen_ms > precut.now_ms() - $6))
-         WHERE id = (SELECT id FROM precut.jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1)",
+        "UPDATE jobs SET help = least(help + $2, $3, $4 * (
+             SELECT count(*) FROM workers WHERE engine = $5 AND seen_ms > now_ms() - $6))
+         WHERE id = (SELECT id FROM jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1)",
     )
     .bind(key.as_bytes().as_slice())
     .bind(column(most))
@@ -166,35 +148,22 @@ impl JobStore for PostgresStore {
         Box::pin(self.submit_job(job, queue_limit))
     }
     fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>> {
-        Box::pin(async move {
-            let mut connection = self.pool.acquire().await?;
-            Ok(record(&mut connection, id).await?)
-        })
+        Box::pin(async move { Ok(record(&mut *self.reader().await?, id).await?) })
     }
     fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
-        Box::pin(self.list_jobs(query))
+        Box::pin(async move { Ok(jobs::list(&mut *self.reader().await?, query).await?) })
     }
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>> {
-        Box::pin(async move {
-            let ids: Vec<String> = ids.iter().map(JobId::to_string).collect();
-            let rows: Vec<(String, Vec<u8>)> = sqlx::query_as(
-                "SELECT id, input FROM precut.jobs WHERE id = ANY($1) AND octet_length(input) BETWEEN 1 AND $2",
-            )
-            .bind(ids)
-            .bind(i32::try_from(most).unwrap_or(i32::MAX))
-            .fetch_all(&self.pool)
-            .await?;
-            Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
-        })
+        Box::pin(async move { Ok(jobs::inputs(&mut *self.reader().await?, &ids, most).await?) })
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(async {
             let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) =
                 sqlx::query_as(
-                    "SELECT (SELECT count(*) FROM precut.jobs WHERE state = 'queued'),
-                     (SELECT count(*) FROM precut.jobs WHERE state = 'running'),
-                     (SELECT count(*) FROM precut.callbacks WHERE state = 'pending'),
-                     (SELECT created_ms FROM precut.jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                    "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
+                     (SELECT count(*) FROM jobs WHERE state = 'running'),
+                     (SELECT count(*) FROM callbacks WHERE state = 'pending'),
+                     (SELECT created_ms FROM jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                      (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
                           AND relnamespace = 'precut'::regnamespace)",
                 )
@@ -231,16 +200,13 @@ impl JobStore for PostgresStore {
         Box::pin(self.write(move |connection| Box::pin(requeue(connection, lease, false, None))))
     }
     fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
-        Box::pin(async move {
-            let mut connection = self.pool.acquire().await?;
-            Ok(usage(&mut connection, &owner).await?)
-        })
+        Box::pin(async move { Ok(usage(&mut *self.reader().await?, &owner).await?) })
     }
     fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
-        Box::pin(async move { Ok(kept_by_owner(&self.pool).await?) })
+        Box::pin(async move { Ok(kept_by_owner(&mut *self.reader().await?).await?) })
     }
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.write(move |connection| Box::pin(note_work(connection, work))))
+        Box::pin(self.write(move |connection| Box::pin(async move { note_work(connection, &work).await })))
     }
     fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         let keep_ms = self.keep_ms;
@@ -269,8 +235,7 @@ impl JobStore for PostgresStore {
     }
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>> {
         Box::pin(async move {
-            let due =
-                "SELECT EXISTS (SELECT FROM precut.callbacks WHERE state = 'pending' AND next_ms <= precut.now_ms())";
+            let due = "SELECT EXISTS (SELECT FROM callbacks WHERE state = 'pending' AND next_ms <= now_ms())";
             // Hardly ever is there one: that is no reason to write.
             if !sqlx::query_scalar::<_, bool>(due).fetch_one(&self.pool).await? {
                 return Ok(Vec::new());
@@ -279,16 +244,16 @@ impl JobStore for PostgresStore {
         })
     }
     fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(self.write(move |connection| Box::pin(callbacks::settle(connection, due, tried))))
+        Box::pin(self.write(move |connection| Box::pin(async move { settle(connection, &due, &tried).await })))
     }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
         Box::pin(self.forget())
     }
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async move { Ok(note_timing(&self.pool, &timing).await?) })
+        Box::pin(async move { Ok(jobs::note_timing(&mut *self.reader().await?, &timing).await?) })
     }
     fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
-        Box::pin(async move { Ok(timings(&self.pool, limit).await?) })
+        Box::pin(async move { Ok(jobs::timings(&mut *self.reader().await?, limit).await?) })
     }
     fn is_shared(&self) -> bool {
         true

@@ -1,15 +1,16 @@
 //! How a job gets into line.
 
-use sqlx::postgres::{PgConnection, PgRow};
+use sqlx::postgres::PgConnection;
 
-use super::record::{Outcome, RecordRow, column, columns, record};
-use super::results::insert;
-use super::usage::{lock_owner, usage};
-use super::{callbacks, lock};
+use super::{column, lock};
+use crate::store::common::callbacks::note;
+use crate::store::common::jobs::{parsed, rank, record};
+use crate::store::common::results::insert;
+use crate::store::common::usage::usage_of;
 use crate::store::jobs::{Accepted, JobState, NewJob, yields_to};
 use crate::store::row::ResultRow;
+use crate::store::sql::Outcome;
 use crate::store::sqlite_jobs::pack::Packed;
-use crate::store::sqlite_jobs::record::{parsed, rank};
 
 /// What a new job's place depends on.
 struct Facts {
@@ -22,23 +23,23 @@ struct Facts {
     queued: i64,
 }
 
-from_row!(PgRow => Facts { lease, attempt, started_ms, own, first, queued });
+from_row!(Facts { lease, attempt, started_ms, own, first, queued });
 
 /// See the SQLite store for the order of turns.
 async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) -> Outcome<Facts> {
     sqlx::query_as(
         "SELECT running.lease, running.attempt, running.started_ms,
-             (SELECT count(*) FROM precut.jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
-             (SELECT min(turn) FROM (SELECT min(turn) AS turn FROM precut.jobs WHERE state = 'queued' AND priority = $3
-                 UNION ALL SELECT min(turn) FROM precut.jobs WHERE state = 'running' AND priority = $3) AS turns) AS first,
-             (SELECT count(*) FROM (SELECT FROM precut.jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
+             (SELECT count(*) FROM jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
+             (SELECT min(turn) FROM (SELECT min(turn) AS turn FROM jobs WHERE state = 'queued' AND priority = $3
+                 UNION ALL SELECT min(turn) FROM jobs WHERE state = 'running' AND priority = $3) AS turns) AS first,
+             (SELECT count(*) FROM (SELECT FROM jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
          FROM (VALUES (1)) AS one
-         LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM precut.jobs WHERE key = $1 AND state = 'running' LIMIT 1)
+         LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM jobs WHERE key = $1 AND state = 'running' LIMIT 1)
              AS running ON true",
     )
     .bind(job.key.as_bytes().as_slice())
     .bind(&job.owner)
-    .bind(i32::try_from(rank(job.priority)).unwrap_or(0))
+    .bind(rank(job.priority))
     .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
     .fetch_one(connection)
     .await
@@ -48,7 +49,7 @@ async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) ->
 async fn known(connection: &mut PgConnection, job: &NewJob) -> Outcome<Option<Accepted>> {
     let Some(idempotency) = &job.idempotency else { return Ok(None) };
     let known: Option<(String, Vec<u8>)> =
-        sqlx::query_as("SELECT id, body_hash FROM precut.jobs WHERE owner = $1 AND idempotency = $2")
+        sqlx::query_as("SELECT id, body_hash FROM jobs WHERE owner = $1 AND idempotency = $2")
             .bind(&job.owner)
             .bind(&idempotency.key)
             .fetch_optional(&mut *connection)
@@ -72,8 +73,7 @@ pub(super) async fn submit(
         return Ok(known);
     }
     if !job.quota.is_none() {
-        lock_owner(connection, &job.owner).await?;
-        let usage = usage(connection, &job.owner).await?;
+        let usage = usage_of(connection, &job.owner).await?;
         let work_ms = if result.is_some() { 0.0 } else { job.estimate_ms };
         if usage.beyond(&job.quota, work_ms).is_some() {
             return Ok(Accepted::OverQuota(usage));
@@ -96,17 +96,16 @@ pub(super) async fn submit(
         insert(connection, std::slice::from_ref(result), now).await?;
     }
     let finished = (state == JobState::Succeeded).then_some(now);
-    let priority = i32::try_from(rank(job.priority)).unwrap_or(0);
+    let priority = rank(job.priority);
     let turn = facts.first.map_or(0, |first| first + 1) + facts.own + yields_to(job.estimate_ms);
-    let row: Option<RecordRow> = sqlx::query_as(concat!(
-        "INSERT INTO precut.jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
+    let written = sqlx::query(
+        "INSERT INTO jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
          VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
              $23, octet_length($7::bytea), $24, $25, $26)
-         ON CONFLICT (owner, idempotency) DO NOTHING RETURNING ",
-        columns!()
-    ))
+         ON CONFLICT (owner, idempotency) DO NOTHING",
+    )
     .bind(job.id.to_string())
     .bind(job.kind.word())
     .bind(&job.calculator)
@@ -133,14 +132,15 @@ pub(super) async fn submit(
     .bind(result.as_ref().map_or(0, ResultRow::bytes))
     .bind(&job.traceparent)
     .bind(&job.tracestate)
-    .fetch_optional(&mut *connection)
+    .execute(&mut *connection)
     .await?;
-    let Some(row) = row else {
+    if written.rows_affected() == 0 {
         // Somebody else was faster: his is the job.
         return known(connection, job).await?.ok_or(sqlx::Error::RowNotFound);
-    };
-    let Some(callback) = &job.callback else { return Ok(Accepted::New(row.record()?)) };
-    callbacks::note(connection, job.id, callback, finished).await?;
+    }
+    if let Some(callback) = &job.callback {
+        note(connection, job.id, callback, finished).await?;
+    }
     let written = record(connection, job.id).await?.ok_or(sqlx::Error::RowNotFound)?;
     Ok(Accepted::New(written))
 }

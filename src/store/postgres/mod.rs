@@ -8,12 +8,9 @@
 mod callbacks;
 mod care;
 mod clock;
-mod documents;
 mod jobs;
 mod line;
 mod news;
-mod processes;
-mod record;
 mod results;
 mod run;
 mod start;
@@ -21,16 +18,16 @@ mod studies;
 #[cfg(test)]
 mod tests;
 mod tls;
-mod usage;
 mod writer;
 
 use std::time::Duration;
 
 use futures_util::future::BoxFuture;
-use sqlx::postgres::{PgConnection, PgPool};
+use sqlx::postgres::{PgConnection, PgPool, Postgres};
 
 use super::address::Secret;
 use super::jobs::{Lease, SILENCE};
+use super::sql::{Outcome, Reads, Writes};
 use super::sqlite::Keep;
 use super::{OpenError, StoreError};
 use crate::key::Key;
@@ -125,7 +122,7 @@ impl PostgresStore {
     /// Does `work` in a transaction.
     async fn write<T: Send>(
         &self,
-        work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, Result<T, sqlx::Error>> + Send,
+        work: impl for<'c> FnOnce(&'c mut PgConnection) -> BoxFuture<'c, Outcome<T>> + Send,
     ) -> Result<T, StoreError> {
         let mut transaction = self.pool.begin().await?;
         let value = work(&mut transaction).await?;
@@ -134,14 +131,40 @@ impl PostgresStore {
     }
 }
 
-/// The lock of a key, as the function `precut.lock_of` makes it.
+impl Reads for PostgresStore {
+    type Database = Postgres;
+    fn readers(&self) -> &PgPool {
+        &self.pool
+    }
+}
+
+impl Writes for PostgresStore {
+    fn write<T: Send + 'static>(
+        &self,
+        work: impl for<'c> Fn(&'c mut PgConnection) -> BoxFuture<'c, Outcome<T>> + Send + Sync + 'static,
+    ) -> BoxFuture<'_, Result<T, StoreError>> {
+        Box::pin(self.write(move |connection| work(connection)))
+    }
+}
+
+/// The lock of a key, as the function `lock_of` makes it.
 fn lock_of(key: &Key) -> i64 {
     key.as_bytes().first_chunk().map_or(0, |bytes| i64::from_be_bytes(*bytes))
 }
 
+/// A count or a version into a column.
+fn column(number: u32) -> i32 {
+    i32::try_from(number).unwrap_or(i32::MAX)
+}
+
+/// Leases and ids as they stand in columns.
+fn texts<T: std::fmt::Display>(items: &[T]) -> Vec<String> {
+    items.iter().map(ToString::to_string).collect()
+}
+
 /// Takes the lock of a key until the transaction ends. What is read afterwards is as whoever had it before left it.
-async fn lock(connection: &mut PgConnection, key: &Key) -> Result<i64, sqlx::Error> {
-    let (now,): (i64,) = sqlx::query_as("SELECT precut.now_ms() FROM pg_advisory_xact_lock($1)")
+async fn lock(connection: &mut PgConnection, key: &Key) -> Outcome<i64> {
+    let (now,): (i64,) = sqlx::query_as("SELECT now_ms() FROM pg_advisory_xact_lock($1)")
         .bind(lock_of(key))
         .fetch_one(connection)
         .await?;
@@ -149,10 +172,10 @@ async fn lock(connection: &mut PgConnection, key: &Key) -> Result<i64, sqlx::Err
 }
 
 /// The same for the key of a job; `None` where there is no such job.
-async fn lock_job(connection: &mut PgConnection, job: &str) -> Result<Option<(Key, i64)>, sqlx::Error> {
+async fn lock_job(connection: &mut PgConnection, job: &str) -> Outcome<Option<(Key, i64)>> {
     let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
-        "SELECT key, precut.now_ms() FROM (SELECT key FROM precut.jobs WHERE id = $1) AS job,
-             LATERAL pg_advisory_xact_lock(precut.lock_of(key))",
+        "SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE id = $1) AS job,
+             LATERAL pg_advisory_xact_lock(lock_of(key))",
     )
     .bind(job)
     .fetch_optional(connection)
@@ -161,10 +184,10 @@ async fn lock_job(connection: &mut PgConnection, job: &str) -> Result<Option<(Ke
 }
 
 /// The same for the key that is computed under a lease; `None` where nothing is.
-async fn lock_lease(connection: &mut PgConnection, lease: Lease) -> Result<Option<(Key, i64)>, sqlx::Error> {
+async fn lock_lease(connection: &mut PgConnection, lease: Lease) -> Outcome<Option<(Key, i64)>> {
     let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
-        "SELECT key, precut.now_ms() FROM (SELECT key FROM precut.jobs WHERE lease = $1 LIMIT 1) AS job,
-             LATERAL pg_advisory_xact_lock(precut.lock_of(key))",
+        "SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE lease = $1 LIMIT 1) AS job,
+             LATERAL pg_advisory_xact_lock(lock_of(key))",
     )
     .bind(lease.to_string())
     .fetch_optional(connection)

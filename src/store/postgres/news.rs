@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use sqlx::postgres::{PgConnection, PgListener, PgPool};
 use tokio::task::JoinHandle;
 
-use super::record::Outcome;
+use super::texts;
 use crate::store::jobs::{Changed, Hear, JobId, Lease, News};
+use crate::store::sql::Outcome;
 
 /// Our notifications.
 const CHANNEL: &str = "precut_news";
@@ -34,7 +35,7 @@ struct Notice {
 
 /// Tells all processes, once the transaction is committed.
 pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
-    let (jobs, unwanted) = (super::record::texts(jobs), super::record::texts(unwanted));
+    let (jobs, unwanted) = (texts(jobs), texts(unwanted));
     let of_jobs = jobs.chunks(TOLD_AT_ONCE).map(|jobs| Notice { jobs: jobs.to_vec(), ..Notice::default() });
     let of_leases =
         unwanted.chunks(TOLD_AT_ONCE).map(|unwanted| Notice { unwanted: unwanted.to_vec(), ..Notice::default() });

@@ -1,45 +1,25 @@
 //! How a job is taken, ended and put back. Whoever does it holds the lock of the job's key.
 
-use sqlx::postgres::{PgConnection, PgPool, PgRow};
+use sqlx::postgres::{PgConnection, PgPool};
 
-use super::record::{Outcome, column, count, ids, record, texts};
-use super::{lock_job, lock_lease, news, results};
+use super::{column, lock_job, lock_lease, news, texts};
 use crate::key::Key;
-use crate::store::jobs::{
-    Beat, Cancelled, Claim, Claimed, JobId, JobKind, JobState, Lease, MOST_ATTEMPTS, Next, Shared, Wanted,
+use crate::store::common::jobs::{
+    Runnable, end, fail_of_owner, parsed, put_back, record, result_of, set_back, set_cancelled, unpacked, unreadable,
+    unwanted,
 };
-use crate::store::row::ResultRow;
+use crate::store::common::results::insert;
+use crate::store::jobs::{Beat, Cancelled, Claimed, JobId, JobState, Lease, MOST_ATTEMPTS, Next, Shared, Wanted};
+use crate::store::sql::Outcome;
 use crate::store::sqlite_jobs::pack::PackedEnding;
-use crate::store::sqlite_jobs::record::{parsed, unreadable};
 
 /// Of what waits so many are looked at for one that nobody else is about to take.
 const LOOKED_AT: i64 = 64;
 
-/// A job that was taken, or given up.
-struct TakenRow {
-    id: String,
-    state: String,
-    attempt: i32,
-    kind: String,
-    calculator: String,
-    priority: i32,
-    turn: i64,
-    owner: String,
-    created_ms: i64,
-    traceparent: Option<String>,
-    tracestate: Option<String>,
-    /// Of one of them only: they are equal.
-    input: Option<Vec<u8>>,
-}
-
-from_row!(PgRow => TakenRow {
-    id, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, input
-});
-
-/// The columns of a [`TakenRow`]; `$1` is the job whose input is wanted.
+/// The columns of a [`Runnable`]; `$1` is the job whose input is wanted.
 macro_rules! taken {
     () => {
-        "id, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
+        "id, key, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
          CASE WHEN id = $1 THEN input END AS input"
     };
 }
@@ -47,7 +27,7 @@ macro_rules! taken {
 /// What waits and may be taken: `$1` is the version, `$2` how long others keep away from what is held, `$3` the longest job.
 macro_rules! in_line {
     () => {
-        "state = 'queued' AND engine = $1 AND (heartbeat_ms IS NULL OR heartbeat_ms <= precut.now_ms() - $2) \
+        "state = 'queued' AND engine = $1 AND (heartbeat_ms IS NULL OR heartbeat_ms <= now_ms() - $2) \
          AND ($3::float8 IS NULL OR (estimate_ms <= $3 AND attempt = 0))"
     };
 }
@@ -68,9 +48,9 @@ pub(super) struct Taker {
 
 pub(super) async fn waits(pool: &PgPool, taker: &Taker, short_ms: Option<f64>) -> Outcome<bool> {
     sqlx::query_scalar(concat!(
-        "SELECT EXISTS (SELECT FROM precut.jobs WHERE ",
+        "SELECT EXISTS (SELECT FROM jobs WHERE ",
         in_line!(),
-        ") OR ($3 IS NULL AND EXISTS (SELECT FROM precut.jobs WHERE ",
+        ") OR ($3 IS NULL AND EXISTS (SELECT FROM jobs WHERE ",
         wants_help!(),
         "))"
     ))
@@ -84,7 +64,7 @@ pub(super) async fn waits(pool: &PgPool, taker: &Taker, short_ms: Option<f64>) -
 pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wanted, keep_ms: i64) -> Outcome<Next> {
     if wanted.again {
         let id: Option<String> =
-            sqlx::query_scalar("SELECT id FROM precut.jobs WHERE lease = $1 AND state = 'running' ORDER BY id LIMIT 1")
+            sqlx::query_scalar("SELECT id FROM jobs WHERE lease = $1 AND state = 'running' ORDER BY id LIMIT 1")
                 .bind(wanted.lease.to_string())
                 .fetch_optional(&mut *connection)
                 .await?;
@@ -104,7 +84,7 @@ pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wa
     }
     // It waits no more, or it has been charged too often to run beside others.
     let suspects: Vec<Option<String>> = sqlx::query_scalar(
-        "UPDATE precut.jobs SET heartbeat_ms = $3 WHERE key = $2 AND state = 'queued'
+        "UPDATE jobs SET heartbeat_ms = $3 WHERE key = $2 AND state = 'queued'
          RETURNING CASE WHEN id = $1 THEN calculator END",
     )
     .bind(&id)
@@ -127,12 +107,12 @@ async fn first(
 ) -> Outcome<Option<(String, Vec<u8>, i64)>> {
     // The rows are materialised in order, and looked at one after the other until a lock is there: no other is taken.
     sqlx::query_as(concat!(
-        "WITH line AS MATERIALIZED (SELECT id, key FROM precut.jobs WHERE ",
+        "WITH line AS MATERIALIZED (SELECT id, key FROM jobs WHERE ",
         in_line!(),
-        " AND ($3 IS NOT NULL OR priority >= coalesce((SELECT max(priority) FROM precut.jobs WHERE ",
+        " AND ($3 IS NOT NULL OR priority >= coalesce((SELECT max(priority) FROM jobs WHERE ",
         wants_help!(),
         "), 0)) ORDER BY priority DESC, turn, id LIMIT $4)
-         SELECT id, key, precut.now_ms() FROM line WHERE pg_try_advisory_xact_lock(precut.lock_of(key)) LIMIT 1"
+         SELECT id, key, now_ms() FROM line WHERE pg_try_advisory_xact_lock(lock_of(key)) LIMIT 1"
     ))
     .bind(&taker.engine)
     .bind(taker.silence_ms)
@@ -145,7 +125,7 @@ async fn first(
 /// A job that wants help, which is then wanted of one less.
 async fn help(connection: &mut PgConnection, taker: &Taker) -> Outcome<Next> {
     let helped: Option<(String, Vec<u8>, String, Vec<u8>)> = sqlx::query_as(concat!(
-        "UPDATE precut.jobs SET help = help - 1 WHERE id = (SELECT id FROM precut.jobs WHERE ",
+        "UPDATE jobs SET help = help - 1 WHERE id = (SELECT id FROM jobs WHERE ",
         wants_help!(),
         " ORDER BY priority DESC, turn, id LIMIT 1 FOR UPDATE SKIP LOCKED) RETURNING id, key, calculator, input"
     ))
@@ -154,9 +134,7 @@ async fn help(connection: &mut PgConnection, taker: &Taker) -> Outcome<Next> {
     .await?;
     let Some((id, key, calculator, input)) = helped else { return Ok(Next::Nothing) };
     let key = Key::from_bytes(&key).ok_or_else(|| unreadable("key"))?;
-    // What is damaged is found out and told by who runs it.
-    let input = zstd::decode_all(input.as_slice()).unwrap_or_default().into();
-    Ok(Next::Help(Shared { id: parsed(&id)?, key, calculator, input }))
+    Ok(Next::Help(Shared { id: parsed(&id)?, key, calculator, input: unpacked(&input) }))
 }
 
 /// Under which lease jobs are taken. What was charged `most` starts already is failed with `problem`; without one it is
@@ -174,9 +152,9 @@ impl Start<'_> {
         connection: &mut PgConnection,
         (id, key, now): (&str, &[u8], i64),
         keep_ms: i64,
-    ) -> Outcome<Vec<TakenRow>> {
+    ) -> Outcome<Vec<Runnable>> {
         sqlx::query_as(concat!(
-            "UPDATE precut.jobs
+            "UPDATE jobs
              SET state = CASE WHEN starts < $3 THEN 'running' ELSE 'failed' END,
                  attempt = CASE WHEN starts < $3 THEN starts + 1 ELSE attempt END,
                  lease = CASE WHEN starts < $3 THEN $4 END,
@@ -186,7 +164,7 @@ impl Start<'_> {
                  finished_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint END,
                  expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
                  progress = 0, stage = NULL, help = 0
-             FROM (SELECT max(attempt) AS starts FROM precut.jobs WHERE key = $2 AND state = 'queued'
+             FROM (SELECT max(attempt) AS starts FROM jobs WHERE key = $2 AND state = 'queued'
                    HAVING bool_or(id = $1) AND ($6::text IS NOT NULL OR max(attempt) < $3)) AS charged
              WHERE key = $2 AND state = 'queued' RETURNING ",
             taken!()
@@ -223,8 +201,8 @@ pub(super) async fn claim(
 
 /// What is computed under a lease.
 async fn held(connection: &mut PgConnection, id: &str, lease: Lease) -> Outcome<Claimed> {
-    let taken: Vec<TakenRow> =
-        sqlx::query_as(concat!("SELECT ", taken!(), " FROM precut.jobs WHERE lease = $2 AND state = 'running'"))
+    let taken: Vec<Runnable> =
+        sqlx::query_as(concat!("SELECT ", taken!(), " FROM jobs WHERE lease = $2 AND state = 'running'"))
             .bind(id)
             .bind(lease.to_string())
             .fetch_all(&mut *connection)
@@ -232,7 +210,7 @@ async fn held(connection: &mut PgConnection, id: &str, lease: Lease) -> Outcome<
     claimed(connection, id, lease, taken).await
 }
 
-async fn claimed(connection: &mut PgConnection, id: &str, lease: Lease, taken: Vec<TakenRow>) -> Outcome<Claimed> {
+async fn claimed(connection: &mut PgConnection, id: &str, lease: Lease, taken: Vec<Runnable>) -> Outcome<Claimed> {
     let jobs = taken.iter().map(|job| parsed(&job.id)).collect::<Outcome<Vec<JobId>>>()?;
     news::tell(connection, &jobs, &[]).await?;
     let Some(job) = taken.into_iter().find(|job| job.id == id) else { return Ok(Claimed::Nothing) };
@@ -242,32 +220,20 @@ async fn claimed(connection: &mut PgConnection, id: &str, lease: Lease, taken: V
     // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
     // Rows that somebody else is about to write are left alone; nobody waits here.
     sqlx::query(
-        "UPDATE precut.jobs SET turn = $1 WHERE id IN (
-             SELECT id FROM precut.jobs WHERE state = 'running' AND priority = $2 AND turn < $1 FOR UPDATE SKIP LOCKED)",
+        "UPDATE jobs SET turn = $1 WHERE id IN (
+             SELECT id FROM jobs WHERE state = 'running' AND priority = $2 AND turn < $1 FOR UPDATE SKIP LOCKED)",
     )
     .bind(job.turn)
     .bind(job.priority)
     .execute(connection)
     .await?;
-    Ok(Claimed::Run(Claim {
-        lease,
-        jobs,
-        kind: JobKind::of_word(&job.kind).ok_or_else(|| unreadable("kind"))?,
-        calculator: job.calculator,
-        // A damaged input is nothing that can be run: who claims it finds that out and says so on the record.
-        input: zstd::decode_all(job.input.unwrap_or_default().as_slice()).unwrap_or_default().into(),
-        attempt: count(job.attempt),
-        owner: job.owner,
-        created_ms: job.created_ms,
-        traceparent: job.traceparent,
-        tracestate: job.tracestate,
-    }))
+    Ok(Claimed::Run(job.claim(lease, jobs)?))
 }
 
 pub(super) async fn hold(pool: &PgPool, id: JobId) -> Outcome<()> {
     sqlx::query(
-        "UPDATE precut.jobs SET heartbeat_ms = precut.now_ms()
-         WHERE id IN (SELECT other.id FROM precut.jobs AS one JOIN precut.jobs AS other USING (key)
+        "UPDATE jobs SET heartbeat_ms = now_ms()
+         WHERE id IN (SELECT other.id FROM jobs AS one JOIN jobs AS other USING (key)
                       WHERE one.id = $1 AND other.state = 'queued' FOR UPDATE OF other SKIP LOCKED)
              AND state = 'queued'",
     )
@@ -284,38 +250,18 @@ pub(super) async fn finish(
     keep_ms: i64,
 ) -> Outcome<Vec<JobId>> {
     let Some((_, now)) = lock_lease(connection, lease).await? else { return Ok(Vec::new()) };
-    let (state, problem, result) = match ending {
-        PackedEnding::Succeeded(result) => (JobState::Succeeded, None, Some(result)),
-        PackedEnding::Failed(problem) => (JobState::Failed, Some(problem), None),
-    };
-    let ended: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs
-         SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $4::bigint + $5, key = coalesce($6, key),
-             result_bytes = $7
-         WHERE lease = $1 AND state = 'running' RETURNING id",
-    )
-    .bind(lease.to_string())
-    .bind(state.word())
-    .bind(problem)
-    .bind(now)
-    .bind(keep_ms)
-    .bind(result.map(|result| result.key.clone()))
-    .bind(result.map_or(0, ResultRow::bytes))
-    .fetch_all(&mut *connection)
-    .await?;
-    if let Some(result) = result
+    let ended = end(connection, lease, ending, (now, keep_ms)).await?;
+    if let Some(result) = result_of(ending)
         && !ended.is_empty()
     {
-        results::insert(connection, std::slice::from_ref(result), now).await?;
+        insert(connection, std::slice::from_ref(result), now).await?;
     }
-    let ended = ids(&ended)?;
     news::tell(connection, &ended, &[]).await?;
     Ok(ended)
 }
 
-/// Puts the running jobs of a lease back in line: `charged` says whether the start counts, `silent_for_ms` that it has
-/// to have been silent for so long. One that was charged twice goes behind all others.
+/// Puts the running jobs of a lease back in line, see [`put_back`]: `silent_for_ms` says that it has to have been silent for
+/// so long.
 pub(super) async fn requeue(
     connection: &mut PgConnection,
     lease: Lease,
@@ -323,39 +269,10 @@ pub(super) async fn requeue(
     silent_for_ms: Option<i64>,
 ) -> Outcome<Vec<JobId>> {
     let Some((_, now)) = lock_lease(connection, lease).await? else { return Ok(Vec::new()) };
-    let back: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs AS job
-         SET state = 'queued', lease = NULL, heartbeat_ms = NULL, started_ms = NULL, progress = 0, stage = NULL,
-             attempt = greatest(0, attempt - $2),
-             turn = CASE WHEN $2 = 0 AND attempt > 1
-                    THEN 1 + (SELECT max(turn) FROM precut.jobs AS other WHERE other.priority = job.priority
-                              AND other.state IN ('queued', 'running'))
-                    ELSE turn END
-         WHERE lease = $1 AND state = 'running' AND heartbeat_ms <= $3 RETURNING id",
-    )
-    .bind(lease.to_string())
-    .bind(i32::from(!charged))
-    .bind(silent_for_ms.map_or(i64::MAX, |ms| now.saturating_sub(ms)))
-    .fetch_all(&mut *connection)
-    .await?;
-    let back = ids(&back)?;
+    let heard_ms = silent_for_ms.map_or(i64::MAX, |ms| now.saturating_sub(ms));
+    let back = put_back(connection, &lease.to_string(), charged, heard_ms).await?;
     news::tell(connection, &back, &[]).await?;
     Ok(back)
-}
-
-/// Of these leases the ones that no running job has.
-pub(super) async fn unwanted(connection: &mut PgConnection, leases: &[String]) -> Outcome<Vec<Lease>> {
-    if leases.is_empty() {
-        return Ok(Vec::new());
-    }
-    let gone: Vec<String> = sqlx::query_scalar(
-        "SELECT DISTINCT lease FROM unnest($1::text[]) AS asked (lease)
-         WHERE NOT EXISTS (SELECT FROM precut.jobs WHERE jobs.lease = asked.lease AND state = 'running')",
-    )
-    .bind(leases)
-    .fetch_all(connection)
-    .await?;
-    gone.iter().map(|lease| parsed(lease)).collect()
 }
 
 pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i64) -> Outcome<Option<Cancelled>> {
@@ -365,19 +282,8 @@ pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i6
     if before.is_final() {
         return Ok(Some(Cancelled { job, before, unwanted: None }));
     }
-    sqlx::query(
-        "UPDATE precut.jobs SET state = 'cancelled', lease = NULL, heartbeat_ms = NULL, stage = NULL, finished_ms = $2,
-             expires_ms = $2::bigint + $3 WHERE id = $1 AND state IN ('queued', 'running')",
-    )
-    .bind(id.to_string())
-    .bind(now)
-    .bind(keep_ms)
-    .execute(&mut *connection)
-    .await?;
-    let unwanted = match job.lease {
-        Some(lease) => unwanted(connection, &[lease.to_string()]).await?.pop(),
-        None => None,
-    };
+    set_cancelled(connection, id, (now, keep_ms)).await?;
+    let unwanted = unwanted(connection, job.lease.as_slice()).await?.pop();
     news::tell(connection, &[id], unwanted.as_slice()).await?;
     let job = record(connection, id).await?.ok_or(sqlx::Error::RowNotFound)?;
     Ok(Some(Cancelled { job, before, unwanted }))
@@ -386,55 +292,28 @@ pub(super) async fn cancel(connection: &mut PgConnection, id: JobId, keep_ms: i6
 pub(super) async fn refuse(
     connection: &mut PgConnection,
     lease: Lease,
-    (owner, problem): (&str, &str),
+    of_whom_and_why: (&str, &str),
     keep_ms: i64,
 ) -> Outcome<Vec<JobId>> {
     let Some((_, now)) = lock_lease(connection, lease).await? else { return Ok(Vec::new()) };
-    let refused: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs
-         SET state = 'failed', problem = $3, lease = NULL, heartbeat_ms = NULL, started_ms = NULL,
-             attempt = greatest(0, attempt - 1), finished_ms = $4, expires_ms = $4::bigint + $5
-         WHERE lease = $1 AND owner = $2 AND state = 'running' RETURNING id",
-    )
-    .bind(lease.to_string())
-    .bind(owner)
-    .bind(problem)
-    .bind(now)
-    .bind(keep_ms)
-    .fetch_all(&mut *connection)
-    .await?;
-    let refused = ids(&refused)?;
+    let refused = fail_of_owner(connection, lease, of_whom_and_why, (now, keep_ms)).await?;
     news::tell(connection, &refused, &[]).await?;
     requeue(connection, lease, false, None).await?;
     Ok(refused)
 }
 
 pub(super) async fn redo(connection: &mut PgConnection, id: JobId) -> Outcome<()> {
-    let id = id.to_string();
-    let Some((key, _)) = lock_job(connection, &id).await? else { return Ok(()) };
-    let back: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs SET state = 'queued', attempt = 0, progress = 0, started_ms = NULL, finished_ms = NULL,
-             expires_ms = NULL, deadline_ms = NULL, result_bytes = 0
-         WHERE id = $1 AND state = 'succeeded' RETURNING id",
-    )
-    .bind(&id)
-    .fetch_all(&mut *connection)
-    .await?;
-    if back.is_empty() {
-        return Ok(());
+    if lock_job(connection, &id.to_string()).await?.is_some() && set_back(connection, id).await? {
+        news::tell(connection, &[id], &[]).await?;
     }
-    sqlx::query("DELETE FROM precut.results WHERE key = $1")
-        .bind(key.as_bytes().as_slice())
-        .execute(&mut *connection)
-        .await?;
-    news::tell(connection, &ids(&back)?, &[]).await
+    Ok(())
 }
 
 /// Notes how far computations are; which of them nobody wants any more.
 pub(super) async fn beat(connection: &mut PgConnection, beats: &[Beat]) -> Outcome<Vec<Lease>> {
     let leases: Vec<Lease> = beats.iter().map(|beat| beat.lease).collect();
     let wanted: Vec<String> = sqlx::query_scalar(
-        "UPDATE precut.jobs AS job SET heartbeat_ms = precut.now_ms(), progress = beat.progress, stage = beat.stage
+        "UPDATE jobs AS job SET heartbeat_ms = now_ms(), progress = beat.progress, stage = beat.stage
          FROM unnest($1::text[], $2::float8[], $3::text[]) AS beat (lease, progress, stage)
          WHERE job.lease = beat.lease AND job.state = 'running' RETURNING job.lease",
     )

@@ -15,7 +15,7 @@ use crate::store::OpenError;
 use crate::store::address::Secret;
 
 /// What this program knows of the tables: the number of its last migration.
-pub(super) const SCHEMA: i32 = 11;
+pub(super) const SCHEMA: i32 = 12;
 /// How long a request waits for a connection before it is told that the store does not serve; in tests, which share their
 /// cores with many others, as long as that never says anything of them.
 const ACQUIRE: Duration = Duration::from_secs(if cfg!(test) { 60 } else { 2 });
@@ -108,6 +108,8 @@ pub(super) async fn connected(address: &Secret, usage: &Use) -> Result<PgPool, O
             })
         })
         .connect_with(options.options([
+            // Tables are named as in the SQLite file.
+            ("search_path", "precut"),
             // Whoever is stopped in the middle of a transaction lets the others go on.
             ("idle_in_transaction_session_timeout", "5s"),
             ("lock_timeout", "10s"),

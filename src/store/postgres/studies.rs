@@ -9,9 +9,11 @@ use sqlx::postgres::{PgConnection, PgPool};
 use tokio::task::JoinHandle;
 
 use super::PostgresStore;
-use super::record::{Outcome, column, count};
+use super::column;
 use crate::key::Key;
+use crate::store::common::jobs::count;
 use crate::store::jobs::{Lease, MOST_ATTEMPTS};
+use crate::store::sql::Outcome;
 use crate::store::{StoreError, Taken};
 
 /// Fast: what is put down is hardly ever read again.
@@ -63,7 +65,7 @@ async fn say_alive(pool: PgPool, holder: Lease, parts: Arc<Mutex<HashSet<(Key, u
             continue;
         }
         let said = sqlx::query(
-            "UPDATE precut.studies AS part SET beat_ms = precut.now_ms()
+            "UPDATE studies AS part SET beat_ms = now_ms()
              FROM unnest($1::bytea[], $2::integer[]) AS held (study, shard)
              WHERE part.study = held.study AND part.shard = held.shard AND part.holder = $3 AND part.points IS NULL",
         )
@@ -106,7 +108,7 @@ impl PostgresStore {
         let (pool, holder) = (self.pool.clone(), self.held.holder.to_string());
         tokio::spawn(async move {
             let _ = sqlx::query(
-                "UPDATE precut.studies SET beat_ms = 0 WHERE study = $1 AND shard = $2 AND holder = $3 AND points IS NULL",
+                "UPDATE studies SET beat_ms = 0 WHERE study = $1 AND shard = $2 AND holder = $3 AND points IS NULL",
             )
             .bind(study.as_bytes().as_slice())
             .bind(column(shard))
@@ -125,8 +127,8 @@ impl PostgresStore {
             return Err(StoreError::Failed("the results of its points are not written yet".to_owned()));
         }
         sqlx::query(
-            "INSERT INTO precut.studies AS part (study, shard, holder, beat_ms, points, checksum, created_ms)
-             VALUES ($1, $2, $3, precut.now_ms(), $4, $5, precut.now_ms())
+            "INSERT INTO studies AS part (study, shard, holder, beat_ms, points, checksum, created_ms)
+             VALUES ($1, $2, $3, now_ms(), $4, $5, now_ms())
              ON CONFLICT (study, shard) DO UPDATE SET points = excluded.points, checksum = excluded.checksum
              WHERE part.holder = excluded.holder AND part.points IS NULL",
         )
@@ -140,7 +142,7 @@ impl PostgresStore {
         self.held.parts().remove(&(study, shard));
         // Whoever gets on is not to blame for the end of its processes: what is put down is not computed again, so that
         // this cannot go on for ever.
-        sqlx::query("UPDATE precut.jobs SET attempt = $2 WHERE key = $1 AND state = 'running' AND attempt > $2")
+        sqlx::query("UPDATE jobs SET attempt = $2 WHERE key = $1 AND state = 'running' AND attempt > $2")
             .bind(study.as_bytes().as_slice())
             .bind(column(MOST_ATTEMPTS - 1))
             .execute(&self.pool)
@@ -152,7 +154,7 @@ impl PostgresStore {
     pub(super) async fn done(&self, study: Key, wanted: Option<Vec<u32>>) -> Result<Vec<(u32, Bytes)>, StoreError> {
         let wanted = wanted.map(|wanted| wanted.into_iter().map(column).collect::<Vec<i32>>());
         let rows: Vec<(i32, Vec<u8>, Vec<u8>)> = sqlx::query_as(
-            "SELECT shard, points, checksum FROM precut.studies
+            "SELECT shard, points, checksum FROM studies
              WHERE study = $1 AND points IS NOT NULL AND ($2::integer[] IS NULL OR shard = ANY($2)) ORDER BY shard",
         )
         .bind(study.as_bytes().as_slice())
@@ -170,7 +172,7 @@ impl PostgresStore {
             }
             tracing::warn!(%study, shard, "a part of a study is damaged; it is computed again");
             sqlx::query(
-                "UPDATE precut.studies SET points = NULL, checksum = NULL, beat_ms = 0
+                "UPDATE studies SET points = NULL, checksum = NULL, beat_ms = 0
                  WHERE study = $1 AND shard = $2 AND checksum = $3",
             )
             .bind(study.as_bytes().as_slice())
@@ -184,9 +186,7 @@ impl PostgresStore {
 
     pub(super) async fn forget_study(&self, study: Key) -> Result<(), StoreError> {
         self.held.parts().retain(|(held, _)| *held != study);
-        for table in
-            ["DELETE FROM precut.shared_studies WHERE study = $1", "DELETE FROM precut.studies WHERE study = $1"]
-        {
+        for table in ["DELETE FROM shared_studies WHERE study = $1", "DELETE FROM studies WHERE study = $1"] {
             sqlx::query(table).bind(study.as_bytes().as_slice()).execute(&self.pool).await?;
         }
         Ok(())
@@ -202,15 +202,13 @@ async fn take(
     silent_ms: i64,
 ) -> Outcome<Option<u32>> {
     let study = study.as_bytes().as_slice();
-    sqlx::query(
-        "INSERT INTO precut.shared_studies (study, created_ms) VALUES ($1, precut.now_ms()) ON CONFLICT DO NOTHING",
-    )
-    .bind(study)
-    .execute(&mut *connection)
-    .await?;
+    sqlx::query("INSERT INTO shared_studies (study, created_ms) VALUES ($1, now_ms()) ON CONFLICT DO NOTHING")
+        .bind(study)
+        .execute(&mut *connection)
+        .await?;
     loop {
         let next: Option<i32> = sqlx::query_scalar(
-            "UPDATE precut.shared_studies SET next = next + 1 WHERE study = $1 AND next < $2 RETURNING next - 1",
+            "UPDATE shared_studies SET next = next + 1 WHERE study = $1 AND next < $2 RETURNING next - 1",
         )
         .bind(study)
         .bind(of)
@@ -218,8 +216,8 @@ async fn take(
         .await?;
         let Some(next) = next else { break };
         let is_new: Option<i32> = sqlx::query_scalar(
-            "INSERT INTO precut.studies (study, shard, holder, beat_ms, created_ms)
-             VALUES ($1, $2, $3, precut.now_ms(), precut.now_ms()) ON CONFLICT DO NOTHING RETURNING shard",
+            "INSERT INTO studies (study, shard, holder, beat_ms, created_ms)
+             VALUES ($1, $2, $3, now_ms(), now_ms()) ON CONFLICT DO NOTHING RETURNING shard",
         )
         .bind(study)
         .bind(next)
@@ -231,9 +229,9 @@ async fn take(
         }
     }
     let silent: Option<i32> = sqlx::query_scalar(
-        "UPDATE precut.studies AS part SET holder = $2, beat_ms = precut.now_ms()
-         FROM (SELECT shard FROM precut.studies
-               WHERE study = $1 AND points IS NULL AND beat_ms <= precut.now_ms() - $3
+        "UPDATE studies AS part SET holder = $2, beat_ms = now_ms()
+         FROM (SELECT shard FROM studies
+               WHERE study = $1 AND points IS NULL AND beat_ms <= now_ms() - $3
                ORDER BY shard LIMIT 1 FOR UPDATE SKIP LOCKED) AS free
          WHERE part.study = $1 AND part.shard = free.shard RETURNING part.shard",
     )

@@ -10,11 +10,12 @@ use sqlx::postgres::PgPool;
 use tokio::sync::{Mutex, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
-use super::record::Outcome;
 use super::results;
 use crate::key::Key;
 use crate::store::KeptResult;
+use crate::store::common;
 use crate::store::row::{Packer, ResultRow};
+use crate::store::sql::Outcome;
 use crate::store::sqlite::Keep;
 
 /// Orders that may wait.
@@ -251,14 +252,14 @@ impl Clerk {
 
 async fn write(pool: &PgPool, rows: &[ResultRow], group: &Group) -> Outcome<()> {
     let mut transaction = pool.begin().await?;
-    let now: i64 = sqlx::query_scalar("SELECT precut.now_ms()").fetch_one(&mut *transaction).await?;
+    let now: i64 = sqlx::query_scalar("SELECT now_ms()").fetch_one(&mut *transaction).await?;
     let bytes = |keys: &mut dyn Iterator<Item = &Key>| -> Vec<Vec<u8>> {
         let mut keys: Vec<Vec<u8>> = keys.map(|key| key.as_bytes().to_vec()).collect();
         keys.sort_unstable();
         keys
     };
     if !group.forgotten.is_empty() {
-        sqlx::query("DELETE FROM precut.results WHERE key = ANY($1)")
+        sqlx::query("DELETE FROM results WHERE key = ANY($1)")
             .bind(bytes(&mut group.forgotten.iter()))
             .execute(&mut *transaction)
             .await?;
@@ -266,13 +267,13 @@ async fn write(pool: &PgPool, rows: &[ResultRow], group: &Group) -> Outcome<()> 
     let mut sorted: Vec<ResultRow> = rows.to_vec();
     sorted.sort_by(|one, other| one.key.cmp(&other.key));
     for some in sorted.chunks(ROWS_AT_ONCE) {
-        results::insert(&mut transaction, some, now).await?;
+        common::results::insert(&mut *transaction, some, now).await?;
     }
     if !group.touched.is_empty() {
         // A use within the last minute is as good as one now, and a row that another process holds is left alone.
         sqlx::query(
-            "UPDATE precut.results SET used_ms = $2 WHERE key IN (
-                 SELECT key FROM precut.results WHERE key = ANY($1) AND used_ms < $2 - 60000 FOR UPDATE SKIP LOCKED)",
+            "UPDATE results SET used_ms = $2 WHERE key IN (
+                 SELECT key FROM results WHERE key = ANY($1) AND used_ms < $2 - 60000 FOR UPDATE SKIP LOCKED)",
         )
         .bind(bytes(&mut group.touched.iter()))
         .bind(now)

@@ -3,10 +3,11 @@
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 
 use super::callbacks;
-use super::record::{Outcome, json_list, parsed};
-use super::run::{requeue, unwanted};
+use super::run::requeue;
+use crate::store::common::jobs::{self, parsed, unwanted};
 use crate::store::jobs::{Changed, JobId, Lease, Timing};
 use crate::store::now_ms;
+use crate::store::sql::Outcome;
 
 /// Timings kept of each calculator.
 const TIMINGS: i64 = 1000;
@@ -22,7 +23,7 @@ pub(super) async fn expire_deadlines(
     now: i64,
 ) -> Outcome<(Changed, Option<i64>)> {
     let late: Vec<(String, Option<String>)> = sqlx::query_as(
-        "SELECT id, lease FROM precut_jobs INDEXED BY precut_jobs_by_deadline
+        "SELECT id, lease FROM jobs INDEXED BY precut_jobs_by_deadline
          WHERE deadline_ms IS NOT NULL AND deadline_ms <= ?1 AND state IN ('queued', 'running')",
     )
     .bind(now)
@@ -30,7 +31,7 @@ pub(super) async fn expire_deadlines(
     .await?;
     for (id, _) in &late {
         sqlx::query(
-            "UPDATE precut_jobs SET state = 'failed', problem = ?2, lease = NULL, heartbeat_ms = NULL, stage = NULL,
+            "UPDATE jobs SET state = 'failed', problem = ?2, lease = NULL, heartbeat_ms = NULL, stage = NULL,
                  finished_ms = ?3, expires_ms = ?4 WHERE id = ?1",
         )
         .bind(id)
@@ -41,10 +42,11 @@ pub(super) async fn expire_deadlines(
         .await?;
     }
     let jobs = late.iter().map(|(id, _)| parsed(id)).collect::<Outcome<Vec<JobId>>>()?;
-    let leases: Vec<String> = late.into_iter().filter_map(|(_, lease)| lease).collect();
-    let unwanted = if leases.is_empty() { Vec::new() } else { unwanted(connection, &leases).await? };
+    let leases = late.iter().filter_map(|(_, lease)| lease.as_ref());
+    let leases = leases.map(|lease| parsed(lease)).collect::<Outcome<Vec<Lease>>>()?;
+    let unwanted = unwanted(connection, &leases).await?;
     let next = sqlx::query_scalar(
-        "SELECT min(deadline_ms) FROM precut_jobs INDEXED BY precut_jobs_by_deadline
+        "SELECT min(deadline_ms) FROM jobs INDEXED BY precut_jobs_by_deadline
          WHERE deadline_ms IS NOT NULL AND state IN ('queued', 'running')",
     )
     .fetch_one(connection)
@@ -53,14 +55,11 @@ pub(super) async fn expire_deadlines(
 }
 
 pub(super) async fn sweep(connection: &mut SqliteConnection, live: &[Lease]) -> Outcome<Vec<JobId>> {
-    let stale: Vec<String> = sqlx::query_scalar(
-        "SELECT DISTINCT lease FROM precut_jobs
-         WHERE state = 'running' AND lease NOT IN (SELECT value FROM json_each(?1))",
-    )
-    .bind(json_list(live))
-    .fetch_all(&mut *connection)
-    .await?;
-    if stale.is_empty() { Ok(Vec::new()) } else { requeue(connection, &json_list(&stale), true).await }
+    let running = sqlx::query_scalar("SELECT DISTINCT lease FROM jobs WHERE state = 'running'");
+    let mut stale: Vec<String> = running.fetch_all(&mut *connection).await?;
+    let live: Vec<String> = live.iter().map(Lease::to_string).collect();
+    stale.retain(|lease| !live.contains(lease));
+    requeue(connection, &stale, true).await
 }
 
 /// What one round of forgetting did.
@@ -75,8 +74,8 @@ pub(super) struct Forgotten {
 pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i64, now: i64) -> Outcome<Forgotten> {
     // First the input, then, much later, the record: that a job was there is known longer than what it gave.
     let emptied = sqlx::query(
-        "UPDATE precut_jobs SET input = x'', idempotency = NULL, body_hash = NULL
-         WHERE id IN (SELECT id FROM precut_jobs INDEXED BY precut_jobs_by_expiry_of_input
+        "UPDATE jobs SET input = x'', idempotency = NULL, body_hash = NULL
+         WHERE id IN (SELECT id FROM jobs INDEXED BY precut_jobs_by_expiry_of_input
                       WHERE expires_ms <= ?1 AND length(input) > 0 LIMIT ?2)",
     )
     .bind(now)
@@ -84,13 +83,12 @@ pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i
     .execute(&mut *connection)
     .await?
     .rows_affected();
-    let records =
-        sqlx::query("DELETE FROM precut_jobs WHERE id IN (SELECT id FROM precut_jobs WHERE expires_ms <= ?1 LIMIT ?2)")
-            .bind(now.saturating_sub(keep_ms.saturating_mul(TOMBSTONE)))
-            .bind(FORGOTTEN_AT_ONCE)
-            .execute(&mut *connection)
-            .await?
-            .rows_affected();
+    let records = sqlx::query("DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE expires_ms <= ?1 LIMIT ?2)")
+        .bind(now.saturating_sub(keep_ms.saturating_mul(TOMBSTONE)))
+        .bind(FORGOTTEN_AT_ONCE)
+        .execute(&mut *connection)
+        .await?
+        .rows_affected();
     let parts = forget_deserted_parts(connection, now.saturating_sub(keep_ms)).await?;
     let most = emptied.max(records).max(parts);
     Ok(Forgotten { records, is_more: most >= u64::from(FORGOTTEN_AT_ONCE) })
@@ -102,7 +100,7 @@ async fn forget_deserted_parts(connection: &mut SqliteConnection, before: i64) -
         "DELETE FROM studies WHERE (study, shard) IN (
              SELECT study, shard FROM studies INDEXED BY studies_by_time
              WHERE created_ms < ?1 AND NOT EXISTS (
-                 SELECT 1 FROM precut_jobs WHERE key = study AND state IN ('queued', 'running'))
+                 SELECT 1 FROM jobs WHERE key = study AND state IN ('queued', 'running'))
              LIMIT ?2)",
     )
     .bind(before)
@@ -112,17 +110,8 @@ async fn forget_deserted_parts(connection: &mut SqliteConnection, before: i64) -
     Ok(deserted.rows_affected())
 }
 
-pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing, now: i64) -> Outcome<()> {
-    sqlx::query(
-        "INSERT INTO timings (calculator, version, predicted_ms, actual_ms, at_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
-    )
-    .bind(&timing.calculator)
-    .bind(timing.version)
-    .bind(timing.predicted_ms)
-    .bind(timing.actual_ms)
-    .bind(now)
-    .execute(&mut *connection)
-    .await?;
+pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing) -> Outcome<()> {
+    jobs::note_timing(connection, timing).await?;
     sqlx::query(
         "DELETE FROM timings WHERE calculator = ?1 AND at_ms < (
              SELECT at_ms FROM timings WHERE calculator = ?1 ORDER BY at_ms DESC LIMIT 1 OFFSET ?2)",
@@ -137,14 +126,11 @@ pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timi
 /// What the process before left behind: its running jobs go back in line, and what it held is free.
 pub(in crate::store) async fn recover(pool: &SqlitePool) -> Outcome<u64> {
     let mut transaction = pool.begin_with("BEGIN IMMEDIATE").await?;
-    let orphans: Vec<String> = sqlx::query_scalar("SELECT DISTINCT lease FROM precut_jobs WHERE state = 'running'")
+    let orphans: Vec<String> = sqlx::query_scalar("SELECT DISTINCT lease FROM jobs WHERE state = 'running'")
         .fetch_all(&mut *transaction)
         .await?;
-    let mut count = 0;
-    if !orphans.is_empty() {
-        count = requeue(&mut transaction, &json_list(&orphans), true).await?.len();
-    }
-    sqlx::query("UPDATE precut_jobs SET heartbeat_ms = NULL WHERE state = 'queued' AND heartbeat_ms IS NOT NULL")
+    let count = requeue(&mut transaction, &orphans, true).await?.len();
+    sqlx::query("UPDATE jobs SET heartbeat_ms = NULL WHERE state = 'queued' AND heartbeat_ms IS NOT NULL")
         .execute(&mut *transaction)
         .await?;
     callbacks::recover(&mut transaction, now_ms()).await?;

@@ -2,27 +2,29 @@
 
 use sqlx::sqlite::SqliteConnection;
 
-use super::callbacks;
 use super::pack::Packed;
-use super::record::{Outcome, parsed, rank, record};
-use super::usage::usage;
+use crate::store::common::callbacks::note;
+use crate::store::common::jobs::{parsed, rank, record};
+use crate::store::common::results::insert;
+use crate::store::common::usage::usage;
 use crate::store::jobs::{Accepted, JobState, yields_to};
-use crate::store::row::{self, ResultRow};
+use crate::store::row::ResultRow;
+use crate::store::sql::Outcome;
 
 /// The place of a new job in the order of its priority.
 ///
 /// A client's jobs follow one another, and a client that has none waiting begins behind the first of the line. So two
 /// clients take turns, however many jobs one of them has sent before the other came. A long job lets some later ones
 /// pass, see [`yields_to`].
-async fn turn(connection: &mut SqliteConnection, owner: &str, priority: i64, estimate_ms: f64) -> Outcome<i64> {
+async fn turn(connection: &mut SqliteConnection, owner: &str, priority: i32, estimate_ms: f64) -> Outcome<i64> {
     let own: i64 =
-        sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = 'queued' AND owner = ?1 AND priority = ?2")
+        sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 'queued' AND owner = ?1 AND priority = ?2")
             .bind(owner)
             .bind(priority)
             .fetch_one(&mut *connection)
             .await?;
     let first: Option<i64> =
-        sqlx::query_scalar("SELECT min(turn) FROM precut_jobs WHERE state IN ('queued', 'running') AND priority = ?1")
+        sqlx::query_scalar("SELECT min(turn) FROM jobs WHERE state IN ('queued', 'running') AND priority = ?1")
             .bind(priority)
             .fetch_one(&mut *connection)
             .await?;
@@ -39,7 +41,7 @@ pub(super) async fn submit(
     let Packed { job, input, result } = packed;
     if let Some(idempotency) = &job.idempotency {
         let known: Option<(String, Vec<u8>)> =
-            sqlx::query_as("SELECT id, body_hash FROM precut_jobs WHERE owner = ?1 AND idempotency = ?2")
+            sqlx::query_as("SELECT id, body_hash FROM jobs WHERE owner = ?1 AND idempotency = ?2")
                 .bind(&job.owner)
                 .bind(&idempotency.key)
                 .fetch_optional(&mut *connection)
@@ -53,41 +55,39 @@ pub(super) async fn submit(
         }
     }
     if !job.quota.is_none() {
-        let usage = usage(connection, &job.owner, now).await?;
+        let usage = usage(connection, &job.owner).await?;
         let work_ms = if result.is_some() { 0.0 } else { job.estimate_ms };
         if usage.beyond(&job.quota, work_ms).is_some() {
             return Ok(Accepted::OverQuota(usage));
         }
     }
     // An equal job that is being computed takes this one along.
-    let running: Option<(String, u32, Option<i64>)> = sqlx::query_as(
-        "SELECT lease, attempt, started_ms FROM precut_jobs WHERE key = ?1 AND state = 'running' LIMIT 1",
-    )
-    .bind(job.key.as_bytes().as_slice())
-    .fetch_optional(&mut *connection)
-    .await?;
+    let running: Option<(String, u32, Option<i64>)> =
+        sqlx::query_as("SELECT lease, attempt, started_ms FROM jobs WHERE key = ?1 AND state = 'running' LIMIT 1")
+            .bind(job.key.as_bytes().as_slice())
+            .fetch_optional(&mut *connection)
+            .await?;
     let (state, lease, attempt, started_ms) = match (result, running) {
         (Some(_), _) => (JobState::Succeeded, None, 0, None),
         (None, Some((lease, attempt, started_ms))) => (JobState::Running, Some(lease), attempt, started_ms),
         (None, None) => (JobState::Queued, None, 0, None),
     };
     if state == JobState::Queued {
-        let queued: i64 = sqlx::query_scalar("SELECT count(*) FROM precut_jobs WHERE state = 'queued'")
-            .fetch_one(&mut *connection)
-            .await?;
+        let queued: i64 =
+            sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 'queued'").fetch_one(&mut *connection).await?;
         let queued = u64::try_from(queued).unwrap_or(0);
         if queued >= queue_limit {
             return Ok(Accepted::QueueFull { queued });
         }
     }
     if let Some(result) = result {
-        row::insert(std::slice::from_ref(result), now, connection).await?;
+        insert(connection, std::slice::from_ref(result), now).await?;
     }
     let finished = (state == JobState::Succeeded).then_some(now);
     let priority = rank(job.priority);
     let turn = turn(connection, &job.owner, priority, job.estimate_ms).await?;
     sqlx::query(
-        "INSERT INTO precut_jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
+        "INSERT INTO jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
@@ -121,7 +121,7 @@ pub(super) async fn submit(
     .execute(&mut *connection)
     .await?;
     if let Some(callback) = &job.callback {
-        callbacks::note(connection, job.id, callback, finished).await?;
+        note(connection, job.id, callback, finished).await?;
     }
     let written = record(connection, job.id).await?.ok_or(sqlx::Error::RowNotFound)?;
     Ok(Accepted::New(written))

@@ -1,35 +1,33 @@
 //! Jobs in the SQLite file. The functions below work inside a transaction of the ledger.
 
-pub(super) mod callbacks;
+mod callbacks;
 mod care;
 mod line;
 pub(super) mod pack;
-pub(super) mod record;
 mod run;
 #[cfg(test)]
 mod tests;
-pub(super) mod usage;
 
 use std::sync::Arc;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use sqlx::QueryBuilder;
-use sqlx::sqlite::Sqlite;
 
+use super::common::callbacks::settle;
+use super::common::jobs::{self, record, set_back};
+use super::common::usage::{forget_work, kept_by_owner, note_work, usage};
 use super::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord,
     JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
 };
+use super::sql::Reads as _;
 use super::sqlite::SqliteStore;
 use super::{StoreError, now_ms};
 pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use record::{Outcome, RecordRow, columns, json_list, record};
-use run::{beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
-use usage::{forget_work, kept_by_owner, note_work, usage};
+use run::{beat, cancel, claim, finish, hold, refuse, requeue, take, waits};
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
@@ -40,7 +38,7 @@ impl SqliteStore {
             .ledger
             .write(move |connection| {
                 let ending = Arc::clone(&ending);
-                Box::pin(async move { finish(connection, lease, &ending, keep_ms, now_ms()).await })
+                Box::pin(async move { finish(connection, lease, &ending, (now_ms(), keep_ms)).await })
             })
             .await?;
         if let PackedEnding::Succeeded(row) = &*written
@@ -68,39 +66,12 @@ impl SqliteStore {
         Ok(accepted)
     }
 
-    async fn list_jobs(&self, query: JobQuery) -> Result<JobPage, StoreError> {
-        let mut statement = QueryBuilder::<Sqlite>::new(concat!("SELECT ", columns!(), " FROM precut_jobs WHERE true"));
-        if let Some(state) = query.state {
-            statement.push(" AND state = ").push_bind(state.word());
-        }
-        if let Some(calculator) = query.calculator {
-            statement.push(" AND calculator = ").push_bind(calculator);
-        }
-        if let Some(owner) = query.owner {
-            statement.push(" AND owner = ").push_bind(owner);
-        }
-        if let Some(key) = query.key {
-            statement.push(" AND key = ").push_bind(key.as_bytes().to_vec());
-        }
-        if let Some(before) = query.before {
-            statement.push(" AND id < ").push_bind(before.to_string());
-        }
-        // One more than asked for tells whether there is another page.
-        statement.push(" ORDER BY id DESC LIMIT ").push_bind(i64::from(query.limit) + 1);
-        let rows: Vec<RecordRow> = statement.build_query_as().fetch_all(&self.readers).await?;
-        let mut items = rows.into_iter().map(RecordRow::record).collect::<Outcome<Vec<_>>>()?;
-        let more = items.len() > query.limit as usize;
-        items.truncate(query.limit as usize);
-        let next = items.last().filter(|_| more).map(|last| last.id);
-        Ok(JobPage { items, next })
-    }
-
     async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
         let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) = sqlx::query_as(
-            "SELECT (SELECT count(*) FROM precut_jobs WHERE state = 'queued'),
-                 (SELECT count(*) FROM precut_jobs WHERE state = 'running'),
+            "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
+                 (SELECT count(*) FROM jobs WHERE state = 'running'),
                  (SELECT count(*) FROM callbacks INDEXED BY callbacks_due WHERE state = 'pending'),
-                 (SELECT created_ms FROM precut_jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                 (SELECT created_ms FROM jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
                  (SELECT page_count FROM pragma_page_count) * (SELECT page_size FROM pragma_page_size)",
         )
         .fetch_one(&self.readers)
@@ -116,26 +87,13 @@ impl JobStore for SqliteStore {
         Box::pin(self.submit_job(job, queue_limit))
     }
     fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>> {
-        Box::pin(async move {
-            let mut reader = self.readers.acquire().await?;
-            Ok(record(&mut reader, id).await?)
-        })
+        Box::pin(async move { Ok(record(&mut *self.reader().await?, id).await?) })
     }
     fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
-        Box::pin(self.list_jobs(query))
+        Box::pin(async move { Ok(jobs::list(&mut *self.reader().await?, query).await?) })
     }
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>> {
-        Box::pin(async move {
-            let rows: Vec<(String, Vec<u8>)> = sqlx::query_as(
-                "SELECT id, input FROM precut_jobs
-                 WHERE id IN (SELECT value FROM json_each(?1)) AND length(input) BETWEEN 1 AND ?2",
-            )
-            .bind(json_list(&ids))
-            .bind(i64::try_from(most).unwrap_or(i64::MAX))
-            .fetch_all(&self.readers)
-            .await?;
-            Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
-        })
+        Box::pin(async move { Ok(jobs::inputs(&mut *self.reader().await?, &ids, most).await?) })
     }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
@@ -164,45 +122,37 @@ impl JobStore for SqliteStore {
     }
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(
-            self.ledger.write(move |connection| {
-                Box::pin(async move { requeue(connection, &json_list(&[lease]), false).await })
-            }),
+            self.ledger.write(move |connection| Box::pin(async move { requeue(connection, &[lease], false).await })),
         )
     }
     fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
-        Box::pin(async move {
-            let mut reader = self.readers.acquire().await?;
-            Ok(usage(&mut reader, &owner, now_ms()).await?)
-        })
+        Box::pin(async move { Ok(usage(&mut *self.reader().await?, &owner).await?) })
     }
     fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
-        Box::pin(async move {
-            let mut reader = self.readers.acquire().await?;
-            Ok(kept_by_owner(&mut reader, now_ms()).await?)
-        })
+        Box::pin(async move { Ok(kept_by_owner(&mut *self.reader().await?).await?) })
     }
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
             let work = work.clone();
-            Box::pin(async move { note_work(connection, &work, now_ms()).await })
+            Box::pin(async move { note_work(connection, &work).await })
         }))
     }
     fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(self.ledger.write(move |connection| {
             let (owner, problem) = (owner.clone(), problem.clone());
-            Box::pin(async move { refuse(connection, lease, (&owner, &problem), keep_ms, now_ms()).await })
+            Box::pin(async move { refuse(connection, lease, (&owner, &problem), (now_ms(), keep_ms)).await })
         }))
     }
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(
             self.ledger
-                .write(move |connection| Box::pin(async move { cancel(connection, id, keep_ms, now_ms()).await })),
+                .write(move |connection| Box::pin(async move { cancel(connection, id, (now_ms(), keep_ms)).await })),
         )
     }
     fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.ledger.write(move |connection| Box::pin(redo(connection, id))))
+        Box::pin(self.ledger.write(move |connection| Box::pin(async move { set_back(connection, id).await.map(drop) })))
     }
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
@@ -242,7 +192,7 @@ impl JobStore for SqliteStore {
     fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
             let (due, tried) = (due.clone(), tried.clone());
-            Box::pin(async move { callbacks::settle(connection, &due, &tried, now_ms()).await })
+            Box::pin(async move { settle(connection, &due, &tried).await })
         }))
     }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
@@ -253,7 +203,7 @@ impl JobStore for SqliteStore {
                 // One transaction after the other, so that jobs get in between.
                 let round = self.ledger.write(move |connection| {
                     Box::pin(async move {
-                        forget_work(connection, now_ms()).await?;
+                        forget_work(connection).await?;
                         forget_expired(connection, keep_ms, now_ms()).await
                     })
                 });
@@ -268,25 +218,11 @@ impl JobStore for SqliteStore {
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
             let timing = timing.clone();
-            Box::pin(async move { note_timing(connection, &timing, now_ms()).await })
+            Box::pin(async move { note_timing(connection, &timing).await })
         }))
     }
     fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
-        Box::pin(async move {
-            let rows: Vec<(String, u32, f64, f64)> = sqlx::query_as(
-                "SELECT calculator, version, predicted_ms, actual_ms FROM timings ORDER BY at_ms DESC LIMIT ?1",
-            )
-            .bind(limit)
-            .fetch_all(&self.readers)
-            .await?;
-            let timing = |(calculator, version, predicted_ms, actual_ms)| Timing {
-                calculator,
-                version,
-                predicted_ms,
-                actual_ms,
-            };
-            Ok(rows.into_iter().map(timing).collect())
-        })
+        Box::pin(async move { Ok(jobs::timings(&mut *self.reader().await?, limit).await?) })
     }
 }
 

@@ -47,7 +47,7 @@ impl Place for InFile {
 
     async fn line(&self) -> Vec<JobId> {
         let line: Vec<String> =
-            sqlx::query_scalar("SELECT id FROM precut_jobs WHERE state = 'queued' ORDER BY priority DESC, turn, id")
+            sqlx::query_scalar("SELECT id FROM jobs WHERE state = 'queued' ORDER BY priority DESC, turn, id")
                 .fetch_all(&self.store.readers)
                 .await
                 .unwrap();
@@ -60,7 +60,7 @@ impl Place for InFile {
     async fn later(&self, ms: i64) {
         let pool = self.pool().await;
         for earlier in [
-            "UPDATE precut_jobs SET started_ms = started_ms - ?1, finished_ms = finished_ms - ?1, expires_ms = expires_ms - ?1",
+            "UPDATE jobs SET started_ms = started_ms - ?1, finished_ms = finished_ms - ?1, expires_ms = expires_ms - ?1",
             "UPDATE work SET minute = (minute * 60000 - ?1) / 60000",
         ] {
             sqlx::query(earlier).bind(ms).execute(&pool).await.unwrap();

@@ -1,7 +1,7 @@
 //! What every store has to do with the records of processes.
 
 use super::Place;
-use crate::store::callbacks::{NewCallback, Subject, TakeUp, Tried};
+use crate::store::callbacks::{CallbackState, NewCallback, Subject, TakeUp, Tried};
 use crate::store::documents::{Kind, NewDocument};
 use crate::store::jobs::Quota;
 use crate::store::processes::{Added, Addition, EntryKind, NewEntry, PartNow};
@@ -139,6 +139,10 @@ pub(in crate::store) async fn what_is_told_of_an_entry_is_due_with_it_and_gone_w
     assert!(store.settle_callback(due[0].clone(), Tried::Delivered).await.unwrap());
     assert!(!store.settle_callback(due[0].clone(), Tried::Delivered).await.unwrap());
     assert_eq!(store.counts().await.unwrap().callbacks, 1);
+    let entries = store.process_entries(NAME.to_owned(), 0, 10, false).await.unwrap();
+    let mut states: Vec<_> = entries.iter().map(|entry| entry.callback.as_ref().map(|told| told.state)).collect();
+    states.sort_by_key(|state| format!("{state:?}"));
+    assert_eq!(states, [None, Some(CallbackState::Delivered), Some(CallbackState::Pending)], "{entries:?}");
     assert!(store.delete_process(NAME.to_owned(), 3).await.unwrap());
     assert_eq!(store.counts().await.unwrap().callbacks, 0);
 }
