@@ -40,8 +40,13 @@ async fn job(server: &Server, address: &str) -> Value {
 
 /// Waits until a callback is in a state.
 async fn callback_in(server: &Server, address: &str, state: &str) -> Value {
+    callback_at(server, address, "/callback", state).await
+}
+
+/// The same of what stands at a pointer of an answer.
+async fn callback_at(server: &Server, address: &str, pointer: &str, state: &str) -> Value {
     loop {
-        let callback = job(server, address).await["callback"].take();
+        let callback = job(server, address).await.pointer(pointer).cloned().unwrap_or_default();
         if callback["state"] == state {
             return callback;
         }
@@ -129,6 +134,12 @@ async fn whom_a_process_names_is_told_of_a_change() {
     assert_eq!(event["data"]["said"], said["explanation"][0]["text"]);
     let part = format!("{at}/parts/p-{number}");
     assert_eq!(event["data"]["links"], json!({ "self": at, "part": part }));
+    let before = said["sequence"].as_u64().unwrap() - 1;
+    let entry = format!("{at}/history?after={before}&limit=1");
+    let done = callback_at(&server, &entry, "/items/0/callback", "delivered").await;
+    assert_eq!((&done["url"], &done["attempts"]), (&json!(receiver.url("/said")), &json!(1)));
+    let declared = job(&server, &format!("{at}/history?limit=1")).await;
+    assert_eq!(declared["items"][0]["callback"], json!(null));
     assert_eq!(receiver.calls().len(), 1, "nothing else was wanted");
     server.stop().await;
 }

@@ -464,3 +464,42 @@ fn what_cuts_nothing_is_told() {
     assert!((number(told, "time_s") - 195.0).abs() < 1e-6, "{told:?}");
     assert!(!codes(&answer).contains(&"no_cut"));
 }
+
+/// The work gives way and comes out thicker than it is meant: a rapid move that is clear of what is meant may come close to it.
+#[test]
+fn a_rapid_move_close_to_what_comes_out_is_told() {
+    for (back, is_close) in [("26.2", true), ("26.4", false)] {
+        let program =
+            format!("G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X26. Z2.\nG1 Z-250. F0.2\nG0 X{back}\nZ2.\nX100.\nM30\n");
+        let answer = try_solve(&bar(&program, "fanuc_a")).unwrap();
+        let told = answer.warnings.iter().find(|warning| warning.code == "rapid_close");
+        assert_eq!(told.is_some(), is_close, "{back}: {:?}", answer.warnings);
+        if let Some(told) = told {
+            assert!((number(told, "line") - 7.0).abs() < 1e-9, "{told:?}");
+            // 0.1 mm off what is meant; what came out thick brings it nearer, by no more than the largest error.
+            let thick_mm = answer.output.yielding.as_ref().unwrap().largest_error_um.unwrap() / 1000.0;
+            let nearer_mm = 0.1 - told.value.unwrap();
+            assert!(nearer_mm > 1e-3 && nearer_mm < thick_mm + 1e-4 && told.limit == Some(0.1), "{told:?}, {thick_mm}");
+        }
+    }
+}
+
+#[test]
+fn a_cut_beyond_what_the_force_law_knows_is_told() {
+    let program = |feed: &str| {
+        format!("G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X29. Z2.\nG1 Z-50. F{feed}\nX40.\nG0 X100.\nM30\n")
+    };
+    let kienzle = |feed: &str| {
+        let mut job = bar(&program(feed), "fanuc_a");
+        job["force"] = json!({
+            "kind": "kienzle", "cutting_edge_angle_deg": 93, "nose_radius_mm": 0.4,
+            "specific_cutting_force_n_per_mm2": 1500.0, "cutting_exponent": 0.25,
+            "specific_normal_force_n_per_mm2": 700.0, "normal_exponent": 0.35,
+        });
+        try_solve(&job).unwrap()
+    };
+    assert!(!codes(&kienzle("0.2")).contains(&"extrapolated_force_model"));
+    let answer = kienzle("2.6");
+    let told = answer.warnings.iter().find(|warning| warning.code == "extrapolated_force_model").unwrap();
+    assert_eq!((told.value, told.limit, told.unit), (Some(2.6), Some(2.5), Some("mm/rev")));
+}

@@ -232,6 +232,54 @@ fn a_rapid_move_through_stock_is_told() {
     assert_eq!(warned(&solve(&bar(&clear, 100.0))), Vec::<&str>::new());
 }
 
+/// A tool whose trailing edge is steeper than the way falls does what is advised.
+#[test]
+fn a_way_that_falls_behind_the_tip_is_told() {
+    let text = format!("{HEAD}G0 X36. Z2.\nG1 Z-20. F0.2\nX30. Z-30.\nZ-50.\nX42.\nG0 X60.\nM30\n");
+    let job = bar(&text, 100.0);
+    let answer = solve(&job);
+    let told: Vec<&Finding> = answer.warnings.iter().filter(|warning| warning.code == "gouge").collect();
+    let [told] = told[..] else { panic!("{told:?}") };
+    assert_eq!(told.values.get("line").cloned(), Some(Said::from(6_usize)));
+    let falls = 0.3_f64.atan().to_degrees();
+    assert!((told.value.unwrap() - falls).abs() < 1e-9 && told.limit == Some(5.0), "{told:?}");
+    for (edge, gouges) in [(falls - 0.01, true), (falls + 0.01, false)] {
+        let mut job = job.clone();
+        job["tools"][0]["minor_edge_angle_deg"] = json!(edge);
+        assert_eq!(warned(&solve(&job)).contains(&"gouge"), gouges, "{edge}");
+    }
+    // The other way round it leads.
+    let up = format!("{HEAD}G0 X30. Z2.\nG1 Z-20. F0.2\nX36. Z-30.\nZ-50.\nX42.\nG0 X60.\nM30\n");
+    assert!(!warned(&solve(&bar(&up, 100.0))).contains(&"gouge"));
+    // Along a circle it is its steepest place: here the half of a right angle.
+    let arc = format!("{HEAD}G0 X36. Z2.\nG1 Z-20. F0.2\nG3 X30. Z-27.2426 R10.2426\nG1 Z-50.\nX42.\nM30\n");
+    let told = solve(&bar(&arc, 100.0));
+    let told = told.warnings.iter().find(|warning| warning.code == "gouge").unwrap().value.unwrap();
+    assert!((40.0..=45.5).contains(&told), "{told}");
+}
+
+#[test]
+fn a_blank_that_is_too_thin_is_told() {
+    let text = format!("{HEAD}G0 X36. Z2.\nG1 Z-100. F0.2\nX42.\nG0 X60.\nM30\n");
+    assert!(!warned(&solve(&bar(&text, 100.0))).contains(&"blank_below_contour"));
+    let mut thin = bar(&text, 100.0);
+    thin["stock"]["profile"] = json!([
+        { "z_mm": 0, "diameter_mm": 40 }, { "z_mm": 30, "diameter_mm": 40 },
+        { "z_mm": 30, "diameter_mm": 35.9 }, { "z_mm": 55, "diameter_mm": 35.9 },
+        { "z_mm": 55, "diameter_mm": 40 }, { "z_mm": 100, "diameter_mm": 40 },
+    ]);
+    let answer = solve(&thin);
+    let told = answer.warnings.iter().find(|warning| warning.code == "blank_below_contour").unwrap();
+    let number = |name: &str| match told.values.get(name) {
+        Some(Said::Number(number)) => *number,
+        other => panic!("{other:?}"),
+    };
+    assert!((told.value.unwrap() - 50.0).abs() < 1e-6, "{told:?}");
+    assert!((number("from_mm") - 30.0).abs() < 1e-9 && (number("to_mm") - 55.0).abs() < 1e-9, "{told:?}");
+    assert_eq!(told.values.get("line").cloned(), Some(Said::from(5_usize)));
+    assert_eq!(at(surface(&answer), 40.0), (35.9, None), "nothing is cut there");
+}
+
 /// What the warning says mends it.
 #[test]
 fn a_program_zero_elsewhere_is_told_with_one_that_fits() {

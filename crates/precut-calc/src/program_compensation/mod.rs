@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -118,7 +118,9 @@ impl Calculator for ProgramCompensation {
                     None => None,
                 };
                 warnings.extend(advice::warnings(&turned, doubt, (stock, zero, fits)));
-                warnings.extend(advice::nose_on_taper(&program, job, zero, &stock::lines_that_finish(&turned)));
+                let finishing = stock::lines_that_finish(&turned);
+                warnings.extend(advice::nose_on_taper(&program, job, zero, &finishing));
+                warnings.extend(advice::blank_below(&program, job, zero, &turned, &finishing));
                 Some(turned)
             }
             None => None,
@@ -126,6 +128,10 @@ impl Calculator for ProgramCompensation {
         let yielded = yielded(&program, job, turned.as_ref(), monitor)?;
         warnings.extend(yielded.as_ref().and_then(advice::turned_law));
         warnings.extend(yielded.iter().flat_map(advice::of_nothing_cut));
+        if let Some((turned, yielded)) = turned.as_ref().zip(yielded.as_ref()) {
+            warnings.extend(advice::close_rapids(yielded, turned));
+            warnings.extend(job.force.iter().flat_map(|force| advice::beyond_law(yielded, force)));
+        }
         let finishing = turned.as_ref().map(stock::lines_that_finish).unwrap_or_default();
         warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
@@ -271,7 +277,7 @@ const CODES: Codes = Codes {
     warnings: &[
         reader::WARNING_CODES,
         advice::WARNING_CODES,
-        &["unconfirmed_force_coefficient", "edge_angle_beyond_table"],
+        &["unconfirmed_force_coefficient", "edge_angle_beyond_table", "extrapolated_force_model"],
     ],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&[

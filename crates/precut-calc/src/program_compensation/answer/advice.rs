@@ -7,9 +7,10 @@ use crate::calculator::{Finding, Message};
 use super::super::job::{Job, ProgramStock};
 use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::reader::{Kind, Nose, Program};
-use super::super::model::stock::{Doubt, Stroke, Turned, implausible_mm, strokes};
-use super::super::model::yielding::{PlaceOfMove, Yielded};
+use super::super::model::stock::{Doubt, FINISHES_MM, Stroke, Turned, Way, implausible_mm, strokes};
+use super::super::model::yielding::{CLOSE_MM, CutMove, PlaceOfMove, Yielded};
 use super::output::{CompensatedProgram, Outcome, RefedProgram};
+use crate::force::{ForceModel, Reached, ReachedCut};
 
 /// Rapid moves that are told.
 const MOST_RAPIDS: usize = 100;
@@ -18,6 +19,10 @@ const CHIP_MM: f64 = 1e-3;
 const NOSE_MM: f64 = 5e-4;
 /// Feeds differ by a larger share.
 const SAME_FEED: f64 = 1e-9;
+/// A finishing line that goes more across than this comes off the work or on to it, and means no surface, 1.
+const ALONG: f64 = 0.4;
+/// A surface that stands lower than it is meant by less is not told, mm.
+const LOW_MM: f64 = 1e-3;
 /// Lines that one warning names.
 const MOST_LINES: usize = 20;
 
@@ -35,6 +40,9 @@ pub(crate) const WARNING_CODES: &[&str] = &[
     "program_unsafe",
     "undersize_before",
     "left_alone",
+    "rapid_close",
+    "gouge",
+    "blank_below_contour",
 ];
 
 /// What an answer may explain.
@@ -148,6 +156,75 @@ pub(crate) fn turned_law(yielded: &Yielded) -> Option<Finding> {
     (!lines.is_empty()).then(|| Finding::new("force_law_turned", "/force").with("lines", lines))
 }
 
+/// Where cuts leave the range in which the force law was measured.
+pub(crate) fn beyond_law(yielded: &Yielded, force: &ForceModel) -> Vec<Finding> {
+    let reached = |values: fn(&CutMove) -> [f64; 2]| {
+        let all = yielded.cuts.iter().flat_map(values);
+        let (least, largest) =
+            all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| (low.min(value), high.max(value)));
+        Reached { pointer: "/nc_program", least, largest }
+    };
+    if yielded.cuts.is_empty() {
+        return Vec::new();
+    }
+    let cut = ReachedCut {
+        depth_mm: reached(|cut| [cut.depth_mm; 2]),
+        feed_mm_per_rev: reached(|cut| cut.feeds_mm_per_rev),
+        speed_m_per_min: reached(|cut| cut.speeds_m_per_min),
+    };
+    // The nose is that of each tool, and not that of the law.
+    let mut found = force.extrapolations(&cut);
+    found.retain(|finding| finding.code == "extrapolated_force_model");
+    found
+}
+
+/// Rapid moves that come close to the work as it yields, but for those that go through it, of which more is said.
+pub(crate) fn close_rapids(yielded: &Yielded, turned: &Turned) -> Vec<Finding> {
+    let goes_through = |line: usize| turned.in_stock.iter().any(|one| one.line == line);
+    let close = yielded.close.iter().filter(|one| !goes_through(one.line)).take(MOST_RAPIDS);
+    let told = close.map(|one| {
+        Finding::new("rapid_close", "/nc_program").measured(one.gap_mm.max(0.0), CLOSE_MM, "mm").with("line", one.line)
+    });
+    told.collect()
+}
+
+/// Where the blank is thinner than a finishing line would leave it, so that nothing is cut: each stretch with its line.
+pub(crate) fn blank_below(
+    program: &Program,
+    job: &Job,
+    zero: f64,
+    turned: &Turned,
+    finishing: &[usize],
+) -> Vec<Finding> {
+    let is_along = |way: &Way| {
+        let [from, to] = way.ends();
+        (to[1] - from[1]).abs() <= ALONG * (to[0] - from[0]).abs()
+    };
+    let mut found: Vec<([f64; 2], f64, usize)> = Vec::new();
+    for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
+        let line = stroke.one.line;
+        let Some(meant) = stroke.shape.line(&stroke.way).filter(|_| is_along(&stroke.way)) else { continue };
+        if finishing.binary_search(&line).is_err() {
+            continue;
+        }
+        for (blank, _) in turned.parts.iter().filter(|(_, owner)| owner.is_none()) {
+            let ends = [blank.x0.max(meant.x0), blank.x1.min(meant.x1)];
+            let low_mm = ends.map(|x| meant.curve.at(x) - blank.curve.at(x)).into_iter().fold(f64::INFINITY, f64::min);
+            if ends[1] - ends[0] > FINISHES_MM && low_mm > LOW_MM {
+                found.push((ends, low_mm, line));
+            }
+        }
+    }
+    let told = found.iter().take(MOST_LINES).map(|([from, to], low_mm, line)| {
+        Finding::new("blank_below_contour", "/stock/profile")
+            .measured(1e3 * low_mm, 0.0, "um")
+            .with("line", *line)
+            .with("from_mm", *from)
+            .with("to_mm", *to)
+    });
+    told.collect()
+}
+
 /// Finishing lines whose cut is pushed off by more than it is deep, which no shift mends for good.
 pub(crate) fn off_by_more_than_deep(yielded: &Yielded, finishing: &[usize]) -> Option<Finding> {
     let is_finishing = |line: usize| finishing.binary_search(&line).is_ok();
@@ -229,5 +306,8 @@ pub(crate) fn warnings(
                 .with("line", cut.line),
         ),
     });
-    doubt.into_iter().chain(rapid).chain(hits).collect()
+    let gouges = turned.gouges.iter().take(MOST_LINES).map(|(line, [falls_deg, edge_deg])| {
+        Finding::new("gouge", "/nc_program").measured(*falls_deg, *edge_deg, "deg").with("line", *line)
+    });
+    doubt.into_iter().chain(rapid).chain(hits).chain(gouges).collect()
 }

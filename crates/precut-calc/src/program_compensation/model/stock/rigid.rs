@@ -14,7 +14,7 @@ use super::sweep::{Shape, Way};
 pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
 
 /// Lines that own so much of the surface finish, mm.
-const FINISHES_MM: f64 = 0.3;
+pub(crate) const FINISHES_MM: f64 = 0.3;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
 /// Multiplications of a move, and of it against a part of the outline, about.
@@ -32,6 +32,8 @@ pub(crate) struct Turned {
     pub(crate) in_stock: Vec<InStock>,
     /// The first move of each line into a place where no tool may come.
     pub(crate) hits: Vec<Hit>,
+    /// Lines on which the trailing edge cuts into what the tip has left: how steep the way falls there, and that edge, deg.
+    pub(crate) gouges: BTreeMap<usize, [f64; 2]>,
     /// Whether anything is cut.
     pub(crate) cuts: bool,
     /// The first cut along the axis: across it a cut may well be as deep as the work is thick.
@@ -229,12 +231,13 @@ pub(crate) fn turned(
         owned: BTreeMap::new(),
         in_stock: Vec::new(),
         hits: Vec::new(),
+        gouges: BTreeMap::new(),
         cuts: false,
         first_cut: None,
     };
     let mut kept_out: Vec<Chain> = job.keep_out.iter().map(cylinder).collect();
     let mut pace = Pace::new(monitor);
-    for Stroke { one, shape, way, .. } in strokes(program, job, zero) {
+    for Stroke { one, tool, shape, way, .. } in strokes(program, job, zero) {
         pace.work(WORK_OF_MOVE * (1 + kept_out.len()) + chain.take_looked_at() * WORK_OF_PART)?;
         for (place, kept_out) in kept_out.iter_mut().enumerate() {
             let depth_mm = kept_out.depth_of(&shape, &way);
@@ -252,6 +255,10 @@ pub(crate) fn turned(
         } else if one.kind.is_feed() {
             let depth_mm = chain.turn(&shape, &way, one.line);
             if depth_mm > CONTACT_MM {
+                if let Some(steepest) = shape.falls_behind(&way, tool.tip_direction == 4) {
+                    let told = turned.gouges.entry(one.line).or_insert([0.0, tool.minor_edge_angle_deg]);
+                    told[0] = told[0].max(steepest);
+                }
                 turned.cuts = true;
                 if way.is_along() {
                     turned.first_cut.get_or_insert(Cut { line: one.line, depth_mm });

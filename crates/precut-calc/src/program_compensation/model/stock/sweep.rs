@@ -107,6 +107,10 @@ pub(crate) struct Swept {
     pub(crate) walls: Vec<Wall>,
 }
 
+/// Directions that are looked at along an arc; a way straighter across the axis has no slope; slopes that are the same, 1.
+const ARC_SHARES: u32 = 36;
+const ACROSS: f64 = 1e-6;
+const SAME_SLOPE: f64 = 1e-9;
 /// An edge goes on as far as there is work, mm.
 const FAR_MM: f64 = 1e6;
 
@@ -126,6 +130,30 @@ impl Shape {
         self.left.is_none_or(|left| slope > -left) && self.right.is_none_or(|right| slope < right)
     }
 
+    /// How steep a way falls behind its tip where the trailing edge is flatter and cuts, deg; none where it does not.
+    pub(crate) fn falls_behind(&self, way: &Way, is_left_hand: bool) -> Option<f64> {
+        let trailing = if is_left_hand { self.left } else { self.right }?;
+        let shares: u32 = if matches!(way, Way::Arc { .. }) { ARC_SHARES } else { 1 };
+        let slopes = (0..shares).filter_map(|share| way.direction((f64::from(share) + 0.5) / f64::from(shares)));
+        // Straight across the axis it is the nose that comes in.
+        let slopes = slopes.filter(|[x, _]| x.abs() > ACROSS).map(|[x, r]| if is_left_hand { -r / x } else { r / x });
+        let steepest = slopes.reduce(f64::max)?;
+        (steepest > trailing * (1.0 + SAME_SLOPE)).then(|| steepest.atan().to_degrees())
+    }
+
+    /// The line that the tool leaves of a straight way along the axis, its ends along it, mm.
+    pub(crate) fn line(&self, way: &Way) -> Option<Piece> {
+        let Way::Line(from, to) = *way else { return None };
+        let [a, b] = if from[0] <= to[0] { [from, to] } else { [to, from] };
+        let slope = (b[1] - a[1]) / (b[0] - a[0]);
+        if !slope.is_finite() || !self.has_slope(slope) {
+            return None;
+        }
+        let by = self.support(slope);
+        let ends = [a, b].map(|[x, r]| [x + by[0], r + by[1]]);
+        Some(Piece { x0: ends[0][0], x1: ends[1][0], curve: Curve::through(ends[0], ends[1]) })
+    }
+
     /// What the way leaves.
     pub(crate) fn sweep(&self, way: &Way) -> Swept {
         let mut swept = Swept::default();
@@ -133,17 +161,7 @@ impl Shape {
             Way::Line(from, to) => {
                 self.stand(from, &mut swept);
                 self.stand(to, &mut swept);
-                let (a, b) = if from[0] <= to[0] { (from, to) } else { (to, from) };
-                let slope = (b[1] - a[1]) / (b[0] - a[0]);
-                if slope.is_finite() && self.has_slope(slope) {
-                    let by = self.support(slope);
-                    let ends = [a, b].map(|[x, r]| [x + by[0], r + by[1]]);
-                    swept.pieces.push(Piece {
-                        x0: ends[0][0],
-                        x1: ends[1][0],
-                        curve: Curve::through(ends[0], ends[1]),
-                    });
-                }
+                swept.pieces.extend(self.line(way));
             }
             Way::Arc { centre, radius, from, turn } => self.sweep_arc((centre, radius), (from, turn), &mut swept),
         }

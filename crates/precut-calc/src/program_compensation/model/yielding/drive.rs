@@ -27,6 +27,10 @@ const NEAREST_MM: f64 = 0.01;
 const CHIP_MM: f64 = 1e-7;
 /// A rapid move that stays farther off is told nothing of, mm.
 const NEAR_MM: f64 = 1.0;
+/// A rapid move that comes nearer to what is left there is told of, mm; where a cut has just ended the tool has to come off first,
+/// mm of its way.
+pub(crate) const CLOSE_MM: f64 = 0.1;
+const COMES_OFF_MM: f64 = 1.0;
 /// Most places at the beginning, and in all.
 const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
@@ -72,6 +76,10 @@ pub(crate) struct Yielded {
     pub(crate) places: Vec<PlaceOfMove>,
     /// The rapid moves that come near to what is left there, in the order of the program.
     pub(crate) rapids: Vec<Clearance>,
+    /// The rapid moves that come close to the work before they are off it, or after: of each line the closest.
+    pub(crate) close: Vec<Clearance>,
+    /// What each move that cuts along the axis asks of the force law.
+    pub(crate) cuts: Vec<CutMove>,
     /// What is left, and what would be, did nothing yield.
     pub(crate) real: Vec<Part>,
     pub(crate) nominal: Vec<Part>,
@@ -81,6 +89,15 @@ pub(crate) struct Yielded {
     pub(crate) missed_lines: BTreeSet<usize>,
     /// Long moves at the feed that cut nothing and do not mean to.
     pub(crate) in_air: Vec<InAir>,
+}
+
+/// What a move along the axis asks of the force law: depth where it is deepest, did nothing yield, feed and speed where it begins
+/// and ends. Across the axis feed and speed go to whatever they are at the end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CutMove {
+    pub(crate) depth_mm: f64,
+    pub(crate) feeds_mm_per_rev: [f64; 2],
+    pub(crate) speeds_m_per_min: [f64; 2],
 }
 
 /// A move at the feed through the air.
@@ -143,6 +160,8 @@ pub(crate) fn yielding(
     let mut yielded = Yielded {
         places: Vec::new(),
         rapids: Vec::new(),
+        close: Vec::new(),
+        cuts: Vec::new(),
         real: Vec::new(),
         nominal: Vec::new(),
         turned_lines: BTreeSet::new(),
@@ -153,9 +172,12 @@ pub(crate) fn yielding(
     // The last move that was still cutting when it ended.
     let mut last_cut: Option<usize> = None;
     let mut pace = calculator::Pace::new(monitor);
+    let mut was_feed = false;
     for stroke in strokes(program, job, zero) {
         let Stroke { one, shape, way, .. } = &stroke;
+        let comes_off = std::mem::replace(&mut was_feed, one.kind.is_feed());
         if one.kind == Kind::Rapid {
+            yielded.find_close(&stroke, &mut real, comes_off);
             let gap_mm = -real.depth_of(shape, way);
             if gap_mm < NEAR_MM {
                 yielded.rapids.push(Clearance { line: one.line, mv: stroke.index, gap_mm });
@@ -217,6 +239,7 @@ pub(crate) fn yielding(
             }
         }
         so_far = after(so_far, way, move_pace);
+        yielded.cuts.extend(asked(way, move_pace, &places));
         let is_turned = places.iter().any(|place| place.depth_mm > 0.0) && climbs(way);
         if is_turned && !matches!(holding.force, ForceModel::Kienzle(_)) {
             yielded.turned_lines.insert(one.line);
@@ -247,7 +270,36 @@ fn lumps(holding: &Holding, meant: &Meant, way: &Way) -> Option<Lumps> {
     Some(Lumps { near_mm: [low, high], supports_mm })
 }
 
+/// What a move asks of the force law; nothing where it cuts nothing.
+fn asked(way: &Way, pace: Pace, places: &[CutPlace]) -> Option<CutMove> {
+    let depth_mm = places.iter().map(|place| place.nominal_depth_mm).fold(0.0, f64::max);
+    let radii = way.ends().map(|[_, radius]| radius.max(AXIS_MM));
+    let [Some(first), Some(last)] = radii.map(|radius| pace.feed_mm_per_rev(radius)) else { return None };
+    let speed = |radius: f64| 2.0 * std::f64::consts::PI * radius * pace.rpm(radius).unwrap_or(0.0) / 1000.0;
+    (depth_mm > MEANT_MM && way.is_along()).then(|| CutMove {
+        depth_mm,
+        feeds_mm_per_rev: [first, last],
+        speeds_m_per_min: radii.map(speed),
+    })
+}
+
 impl Yielded {
+    /// Keeps a rapid move that comes close to the work; where a cut has just ended, once it had to be off.
+    fn find_close(&mut self, stroke: &Stroke<'_>, real: &mut Chain, comes_off: bool) {
+        let length_mm = stroke.way.length_mm();
+        let from = if comes_off { COMES_OFF_MM / length_mm } else { 0.0 };
+        if length_mm <= 0.0 || from >= 1.0 {
+            return;
+        }
+        let gap_mm = -real.depth_of(&stroke.shape, &stroke.way.lifted([from, 1.0], [0.0; 2]));
+        let close = Clearance { line: stroke.one.line, mv: stroke.index, gap_mm };
+        match self.close.last_mut().filter(|last| last.line == close.line) {
+            _ if gap_mm >= CLOSE_MM => {}
+            Some(last) => last.gap_mm = last.gap_mm.min(gap_mm),
+            None => self.close.push(close),
+        }
+    }
+
     /// Keeps a move at the feed that cuts nothing, with the depth that it would have, did nothing yield.
     fn find_nothing(&mut self, stroke: &Stroke<'_>, meant_mm: f64) {
         let (line, length_mm) = (stroke.one.line, stroke.way.length_mm());

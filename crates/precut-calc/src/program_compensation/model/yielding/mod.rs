@@ -12,4 +12,4 @@ mod sections;
 
 pub(crate) use contour::{ContourError, between, contour};
 pub(crate) use cut::{AXIS_MM, CutPlace, Load, Pace};
-pub(crate) use drive::{Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};
+pub(crate) use drive::{CLOSE_MM, CutMove, Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};
