@@ -270,7 +270,7 @@ export function Causes({ causes: { result, kinds, conditions, unit, isSilent }, 
           .filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0))
           .map(
             ([name, value]) =>
-              html`<span key=${name} class=${name === next.changes ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`,
+              html`<span key=${name} class=${next.changes.split(', ').includes(name) ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`,
           )}</p>
         <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), after: number(next.separation_then_sigmas, 2) })}</p>
         ${sheet && html`<${SheetButtons} ...${{ sheet, answer, name, owns, stale, title }} />`}`

@@ -140,8 +140,19 @@ pub(crate) fn job<M: Diagnosable>(request: &Value, options: Value) -> JobOf<M> {
 fn answer<M: Diagnosable>(trial: &Trial) -> Said {
     let job = job::<M>(&trial.request, json!({ "held_out": asked_for("PRECUT_TRIAL_GAIN") }));
     let result = Diagnosis::<M>::run(&job, &Unwatched).unwrap().output;
+    let later = later::<M>(trial, &result);
     if asked_for("PRECUT_TRIAL_TALK") {
+        println!("estimated {:.0} ms, {later:?}", Diagnosis::<M>::cost(&job).ms);
         talk::<M>(trial, &result);
+    }
+    let mut hidden: Vec<String> = trial.truth.causes.iter().map(|hidden| hidden.kind.to_owned()).collect();
+    let mut named = kinds(&result.named);
+    hidden.sort_unstable();
+    named.sort_unstable();
+    let is_other = result.verdict == VerdictClass::Named && named != hidden && !trial.truth.together.is_empty();
+    let named_instead = is_other.then(|| separation_from::<M>(&job, &trial.truth.together, &result.named).unwrap());
+    if let (Some(sigmas), true) = (named_instead, asked_for("PRECUT_TRIAL_TALK")) {
+        println!("     named instead, {sigmas:.1} sigmas away");
     }
     let first = result.sets.iter().find(|set| !set.causes.is_empty() && !set.with_remainder);
     Said {
@@ -157,8 +168,9 @@ fn answer<M: Diagnosable>(trial: &Trial) -> Said {
             HeldOut { explained: base - square(gain.rmse_extended), explainable: base - square(gain.noise_ceiling) }
         }),
         separations: separations::<M>(trial, &job),
+        named_instead,
         ideal: None,
-        later: later::<M>(trial, &result),
+        later,
     }
 }
 

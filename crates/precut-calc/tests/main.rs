@@ -34,6 +34,7 @@ mod diagnosis_claims;
 mod diagnosis_classes;
 mod diagnosis_deflection;
 mod diagnosis_known;
+mod diagnosis_next;
 mod diagnosis_profiles;
 mod diagnosis_refusals;
 mod diagnosis_remainder;

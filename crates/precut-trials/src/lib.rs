@@ -49,6 +49,8 @@ pub struct Truth {
     pub class: Class,
     /// The causes that act, by kind; of class [`Class::Outside`] one that no catalogue holds.
     pub causes: Vec<Hidden>,
+    /// What they change in every row together, as a [signature](Hidden::signature).
+    pub together: Vec<f64>,
 }
 
 /// Classes of trials.

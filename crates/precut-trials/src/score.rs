@@ -26,6 +26,8 @@ pub struct Said {
     /// Of every hidden cause, how far it stands from what any other single cause could make of the rows, sigmas; empty
     /// where that was not looked at.
     pub separations: Vec<f64>,
+    /// Of causes named in the place of others: how far what is hidden stands from what they could make of the rows, sigmas.
+    pub named_instead: Option<f64>,
     /// Whether an observer finds the one cause who knows what every cause would look like; `None` where nobody was asked.
     pub ideal: Option<bool>,
     /// What the extended model explains of rows that were measured afterwards under other conditions, where there are such.
@@ -93,6 +95,8 @@ impl std::fmt::Display for Share {
 const CLASSES: [f64; 3] = [3.0, 5.0, 8.0];
 /// Separation from which on a cause is told apart.
 const APART: f64 = 5.0;
+/// Distance from which on rows object to a set that is named in the place of the truth, sigmas.
+const OBJECTED: f64 = 4.0;
 /// Separation from the whole catalogue from which on something that it lacks is told apart.
 const APART_FROM_ALL: f64 = 6.0;
 
@@ -120,6 +124,8 @@ pub struct Score {
     pub truth_listed: Share,
     /// Two causes: of those named, both names are right.
     pub pair_right: Share,
+    /// One or two causes: of those named otherwise, the rows cannot tell what is named from what is hidden.
+    pub alike: Share,
     /// Outside the catalogue: `unknown`.
     pub unknown: Share,
     /// 95 % intervals that hold the truth.
@@ -198,6 +204,7 @@ impl Score {
             }
         }
         if matches!(truth.class, Class::One | Class::Two) {
+            said.named_instead.into_iter().for_each(|sigmas| self.alike.add(sigmas < OBJECTED));
             match said.verdict.as_str() {
                 "named" => self.truth_listed.add(same(&said.named)),
                 "confounded" => self.truth_listed.add(said.likely.iter().any(|set| same(set))),
@@ -250,6 +257,7 @@ impl std::fmt::Display for Score {
             ("one or two, truth in what was said", self.truth_listed),
             ("two causes, of those named: both right", self.pair_right),
             ("two causes 5 sigmas apart, heaviest right", self.pair_apart),
+            ("others named, below 4 sigmas from the truth", self.alike),
             ("outside the catalogue, unknown", self.unknown),
             ("... and 6 sigmas apart from all of it", self.unknown_apart),
             ("95 % intervals that hold the truth", self.coverage),

@@ -5,7 +5,8 @@ use super::input::{FeedDirection, Job};
 use crate::calculator::{NextRun, Ranges, Rows};
 
 /// One more run for every condition at either end of its range, the other conditions as in the run
-/// in the middle; the other feed direction; a fresh edge; a cold machine.
+/// in the middle; depth and feed both at an end, where the force lies farthest off; the other feed direction; a fresh edge; a
+/// cold machine.
 pub(super) fn next_runs(
     job: &Job,
     rows: &Rows<DeflectionRun, DeflectionPoint>,
@@ -26,6 +27,12 @@ pub(super) fn next_runs(
     }
     for value in ends("feed_mm_per_rev", &feed) {
         add("feed_mm_per_rev", DeflectionRun { feed_mm_per_rev: Some(value), ..typical.clone() });
+    }
+    for depth in ends("depth_mm", &depth) {
+        for feed in ends("feed_mm_per_rev", &feed) {
+            let run = DeflectionRun { depth_mm: Some(depth), feed_mm_per_rev: Some(feed), ..typical.clone() };
+            add("depth_mm, feed_mm_per_rev", run);
+        }
     }
     if typical.spindle_speed_rpm.is_none() {
         for value in ends("speed_m_per_min", &speed) {

@@ -26,6 +26,11 @@ const STEPS: usize = 8;
 const SHARES: [f64; 2] = [1.0, 0.3];
 /// A step that lowers the misfit by less than this share ends a descent by steps.
 const WORTH_IT: f64 = 0.01;
+/// Share of what was measured that a place may leave and still explain it.
+const LITTLE: f64 = 0.1;
+/// Where it does not: which of the sizes are tried far from the straight line, and which points between those of the grid.
+const EVERY_PLACE: usize = 3;
+const EVERY_PART: usize = 2;
 /// First move along one variable, share of the largest size.
 const FIRST_MOVE: f64 = 0.1;
 /// How often the moves are halved: to a quarter.
@@ -108,6 +113,10 @@ impl<'a> Survey<'a> {
             self.step_downhill(place)?;
         }
         self.leave_one_of_each(&mut found);
+        if !straight && self.expansions.parts > 1 && !found.first().is_some_and(|best| self.explains(best)) {
+            found.extend(self.far_from_straight(grid, monitor)?);
+            self.leave_one_of_each(&mut found);
+        }
         if !straight {
             for place in found.iter_mut().take(FELT) {
                 checkpoint(monitor)?;
@@ -116,6 +125,37 @@ impl<'a> Survey<'a> {
             self.leave_one_of_each(&mut found);
         }
         Ok(found)
+    }
+
+    /// Where the best of those that a straight line leads to leaves much: all the sizes given at every point of the grid, a few at
+    /// points between, and from the best of these downhill. A large wave shows another shape than a small one, so that no
+    /// straight line tells which ratio it has; and one that comes back alike in every turn is found at that very ratio only.
+    fn far_from_straight(&self, grid: &[Setting], monitor: &dyn Monitor) -> Result<Vec<Place>, Failure> {
+        let few: Vec<Vec<f64>> = self.expansions.places.iter().step_by(EVERY_PLACE).cloned().collect();
+        let mut found = Vec::new();
+        for at in grid {
+            checkpoint(monitor)?;
+            let mut best = |at: &Setting, sizes: &[Vec<f64>]| {
+                let places = self.with_sizes(&self.at_zero(at), sizes)?;
+                found.extend(places.into_iter().min_by(|a, b| self.misfit(a).total_cmp(&self.misfit(b))));
+                Ok::<(), Failure>(())
+            };
+            best(at, &self.expansions.places)?;
+            for between in self.refined(at).iter().step_by(EVERY_PART) {
+                best(between, &few)?;
+            }
+        }
+        self.rank(&mut found);
+        for place in &mut found {
+            checkpoint(monitor)?;
+            self.step_downhill(place)?;
+        }
+        Ok(found)
+    }
+
+    /// Whether a place leaves little of what was measured.
+    fn explains(&self, place: &Place) -> bool {
+        self.misfit(place) <= LITTLE * dot(self.residual, self.residual)
     }
 
     fn declared(&self) -> &'a Hypothesis {

@@ -21,7 +21,7 @@ pub fn is_found(snr: f64, seed: u64) -> bool {
         expected.extend(found.map(|one| Expected {
             kind: cause.kind,
             two_sided: cause.two_sided,
-            signature: drawn.signature_um(&one),
+            signature: drawn.signature_um(&[one]),
         }));
     }
     drawn.covariance().best(&drawn.residual_um, &expected) == Some(truth.kind)

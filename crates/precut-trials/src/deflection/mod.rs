@@ -42,6 +42,30 @@ pub(crate) struct Run {
     pub(crate) warm_at_start_min: f64,
 }
 
+impl Run {
+    /// As a request states it.
+    fn said(&self) -> Value {
+        json!({
+            "depth_mm": self.depth_mm, "feed_mm_per_rev": self.feed_mm_per_rev, "speed_m_per_min": self.speed_m_per_min,
+            "feed_direction": if self.to_headstock { "to_headstock" } else { "to_tailstock" },
+            "tool_path_at_start_m": self.path_at_start_m, "warm_time_at_start_min": self.warm_at_start_min
+        })
+    }
+
+    /// The run that a request states with all of these conditions.
+    fn stated(run: &Value) -> Self {
+        let number = |field: &str| run[field].as_f64().unwrap_or(f64::NAN);
+        Self {
+            depth_mm: number("depth_mm"),
+            feed_mm_per_rev: number("feed_mm_per_rev"),
+            speed_m_per_min: number("speed_m_per_min"),
+            to_headstock: run["feed_direction"] == "to_headstock",
+            path_at_start_m: number("tool_path_at_start_m"),
+            warm_at_start_min: number("warm_time_at_start_min"),
+        }
+    }
+}
+
 /// What acts at a station beside the base: the hidden effects.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Acting {
@@ -90,10 +114,43 @@ pub fn turned_um(class: Class, snr: f64, seed: u64, path: &[(f64, f64)]) -> Vec<
     path.iter().map(at).collect()
 }
 
+/// One more run on the machine of a trial, measured at its places as often as the others; without conditions it is one that a
+/// later shift would make. The run as a request states it, and its rows, of run `number`.
+pub fn measured_next(
+    class: Class,
+    snr: f64,
+    seed: u64,
+    conditions: Option<&Value>,
+    number: usize,
+) -> (Value, Vec<Value>) {
+    let drawn = drawn(Scatter::Student, class, snr, seed);
+    // Numbers of its own: what the draw takes is not changed by what comes after it.
+    let mut random = Random::new(seed ^ 0x4e87);
+    let shift = runs(&drawn.lathe, &mut random);
+    let any = random.whole(0, shift.len() - 1);
+    let run = conditions.map_or_else(|| shift[any].clone(), Run::stated);
+    let Drawn { lathe, hidden, trial, .. } = &drawn;
+    let machine = Machine {
+        lathe,
+        hidden,
+        level: drawn.level,
+        bending: drawn.bending,
+        sigma: trial.sigma,
+        scatter: Scatter::Student,
+    };
+    // What depends on the order of runs counts on from those before.
+    let (rows, _) = machine.measure(&vec![run.clone(); number], &drawn.places, drawn.traces, &mut random);
+    let own = rows.into_iter().filter(|row| row["run"] == number);
+    (run.said(), own.collect())
+}
+
 /// A trial and what it was made of.
 struct Drawn {
     trial: Trial,
     lathe: Lathe,
+    /// Factors on the force and on the flexibility of the shaft that are no finding.
+    level: f64,
+    bending: f64,
     runs: Vec<Run>,
     places: Vec<f64>,
     traces: usize,
@@ -114,9 +171,9 @@ impl Drawn {
         deviations_um(&self.lathe, &self.runs, &stations, hidden, force)
     }
 
-    /// What a cause alone changes in every row.
-    fn signature_um(&self, one: &Scaled) -> Vec<f64> {
-        let (with, without) = (self.clean_um(std::slice::from_ref(one), 1.0, 1.0), self.clean_um(&[], 1.0, 1.0));
+    /// What causes change in every row.
+    fn signature_um(&self, hidden: &[Scaled]) -> Vec<f64> {
+        let (with, without) = (self.clean_um(hidden, 1.0, 1.0), self.clean_um(&[], 1.0, 1.0));
         let change: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
         self.by_trace(&change)
     }
@@ -164,20 +221,20 @@ fn attempt(scatter: Scatter, class: Class, snr: f64, random: &mut Random) -> Opt
     let stations = stations(&lathe, &places, &hidden, 1.0);
     let best = deviations_um(&lathe, &runs_later, &stations, &hidden, 1.0);
     let later = Some(Later { request: request(&lathe, &runs_later, &rows_later), best });
-    let truth = Truth { class, causes: Vec::new() };
+    let truth = Truth { class, causes: Vec::new(), together: Vec::new() };
     let trial = Trial { request: request(&lathe, &runs, &rows), truth, sigma, later };
-    let mut drawn = Drawn { trial, lathe, runs, places, traces, hidden, residual_um: Vec::new() };
+    let mut drawn = Drawn { trial, lathe, level, bending, runs, places, traces, hidden, residual_um: Vec::new() };
     let of = |one: &Scaled| Hidden {
         kind: one.cause.kind,
         size: one.size,
         shapes: one.shapes(),
         snr,
-        signature: drawn.signature_um(one),
+        signature: drawn.signature_um(std::slice::from_ref(one)),
     };
     let causes = drawn.hidden.iter().map(of).collect();
     let plain = drawn.by_trace(&drawn.clean_um(&[], 1.0, 1.0));
     drawn.residual_um = measured.iter().zip(plain).map(|(measured, plain)| measured - plain).collect();
-    drawn.trial.truth.causes = causes;
+    drawn.trial.truth = Truth { class, causes, together: drawn.signature_um(&drawn.hidden) };
     Some(drawn)
 }
 
@@ -389,17 +446,7 @@ fn request(lathe: &Lathe, runs: &[Run], rows: &[Value]) -> Value {
     let (x, p, n) = lathe.exponents;
     let (depth, feed, speed) = REFERENCE;
     let coefficient = lathe.force_n / (depth.powf(x) * feed.powf(p) * speed.powf(n));
-    let runs: Vec<Value> = runs
-        .iter()
-        .map(|run| {
-            json!({
-                "depth_mm": run.depth_mm, "feed_mm_per_rev": run.feed_mm_per_rev,
-                "speed_m_per_min": run.speed_m_per_min,
-                "feed_direction": if run.to_headstock { "to_headstock" } else { "to_tailstock" },
-                "tool_path_at_start_m": run.path_at_start_m, "warm_time_at_start_min": run.warm_at_start_min
-            })
-        })
-        .collect();
+    let runs: Vec<Value> = runs.iter().map(Run::said).collect();
     json!({
         "calculator": "deflection-compensation",
         "job": {

@@ -15,7 +15,7 @@ pub fn is_found(snr: f64, seed: u64) -> bool {
     let mut expected = vec![Expected { kind: truth.kind, two_sided, signature: truth.signature.clone() }];
     for cause in CAUSES.iter().filter(|cause| cause.kind != truth.kind) {
         let found = scaled(*cause, &drawn.output, &drawn.cuts, snr * drawn.trial.sigma, &mut random);
-        let of = |one| Expected { kind: cause.kind, two_sided: cause.two_sided, signature: drawn.signature(&one) };
+        let of = |one| Expected { kind: cause.kind, two_sided: cause.two_sided, signature: drawn.signature(&[one]) };
         expected.extend(found.map(of));
     }
     // Cuts stand alone: each is a sweep of its own.

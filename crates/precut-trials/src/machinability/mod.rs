@@ -98,9 +98,8 @@ struct Drawn {
 
 impl Drawn {
     /// What a cause alone changes in the logarithm of every row.
-    fn signature(&self, one: &Scaled) -> Vec<f64> {
-        let alone = std::slice::from_ref(one);
-        self.cuts.iter().map(|cut| (with(alone, &self.output, cut) / self.output.plain(cut)).ln()).collect()
+    fn signature(&self, hidden: &[Scaled]) -> Vec<f64> {
+        self.cuts.iter().map(|cut| (with(hidden, &self.output, cut) / self.output.plain(cut)).ln()).collect()
     }
 }
 
@@ -146,7 +145,7 @@ fn attempt((plan, scatter): (Plan, Scatter), class: Class, snr: f64, random: &mu
     let (rows_later, _) = measure((plan, scatter), &output, &hidden, &cuts_later, (level, sigma), random);
     let best = cuts_later.iter().map(|cut| with(&hidden, &output, cut).ln()).collect();
     let radius_mm = cuts.first().map_or(0.8, |cut| cut.radius_mm);
-    let truth = Truth { class, causes: Vec::new() };
+    let truth = Truth { class, causes: Vec::new(), together: Vec::new() };
     let later = Some(Later { request: request(&output, radius_mm, rows_later), best });
     let trial = Trial { request: request(&output, radius_mm, rows), truth, sigma, later };
     let mut drawn = Drawn { trial, output, cuts, hidden, residual };
@@ -155,9 +154,10 @@ fn attempt((plan, scatter): (Plan, Scatter), class: Class, snr: f64, random: &mu
         size: one.size,
         shapes: one.shapes(),
         snr,
-        signature: drawn.signature(one),
+        signature: drawn.signature(std::slice::from_ref(one)),
     };
-    drawn.trial.truth.causes = drawn.hidden.iter().map(of).collect();
+    let causes = drawn.hidden.iter().map(of).collect();
+    drawn.trial.truth = Truth { class, causes, together: drawn.signature(&drawn.hidden) };
     Some(drawn)
 }
 

@@ -58,12 +58,25 @@ impl Scaled {
     pub(crate) fn first_value(&self, rig: &Rig) -> f64 {
         match self.cause.kind {
             "initial_harmonic" => self.size * self.phase().cos(),
-            "roller_runout" => {
-                let turned = TAU * (rig.revolutions + rig.spark_out);
-                self.size * (self.ratio() * turned + self.phase()).cos()
-            }
+            "roller_runout" => self.size * self.end_phase(rig).cos(),
             "spark_out_missing" => 0.0,
             _ => self.size,
+        }
+    }
+
+    /// Phase of a roller where the turning ends.
+    fn end_phase(&self, rig: &Rig) -> f64 {
+        self.ratio() * TAU * (rig.revolutions + rig.spark_out) + self.phase()
+    }
+
+    /// What the catalogue fits beside the first value.
+    pub(crate) fn shapes(&self, rig: &Rig) -> Vec<(&'static str, f64)> {
+        match self.cause.kind {
+            "initial_harmonic" => vec![("amplitude_sin_phase_mm", self.size * self.phase().sin())],
+            "roller_runout" => {
+                vec![("amplitude_sin_end_phase_mm", self.size * self.end_phase(rig).sin()), ("ratio", self.ratio())]
+            }
+            _ => Vec::new(),
         }
     }
 

@@ -97,19 +97,23 @@ fn attempt(class: Class, snr: f64, random: &mut Random) -> Option<Trial> {
             rows.push(json!({ "trace": trace, "angle_deg": place, "radial_deviation_um": round(value, 2) }));
         }
     }
+    let signature = |hidden: &[Scaled]| {
+        let with = clean_um(&rig, hidden, &angles)?;
+        let change: Vec<f64> = with.iter().zip(&base).map(|(with, base)| with - base).collect();
+        Some(change.repeat(traces))
+    };
     let mut causes = Vec::new();
     for one in &hidden {
-        let with = clean_um(&rig, std::slice::from_ref(one), &angles)?;
-        let change: Vec<f64> = with.iter().zip(&base).map(|(with, base)| with - base).collect();
         causes.push(Hidden {
             kind: one.cause.kind,
             size: one.first_value(&rig),
-            shapes: Vec::new(),
+            shapes: one.shapes(&rig),
             snr,
-            signature: change.repeat(traces),
+            signature: signature(std::slice::from_ref(one))?,
         });
     }
-    Some(Trial { request: request(&rig, &rows), truth: Truth { class, causes }, sigma, later: None })
+    let truth = Truth { class, causes, together: signature(&hidden)? };
+    Some(Trial { request: request(&rig, &rows), truth, sigma, later: None })
 }
 
 fn round(value: f64, digits: i32) -> f64 {
