@@ -71,6 +71,7 @@ mod fixture_identification;
 mod fixture_methods;
 mod fixture_paper;
 mod fixture_reference;
+mod fixture_slow;
 mod fixture_support;
 mod fixture_watch;
 mod force_beyond_90;
