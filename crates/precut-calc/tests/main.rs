@@ -62,6 +62,7 @@ mod feed_support;
 mod fixture_certainty;
 mod fixture_class_trials;
 mod fixture_classes;
+mod fixture_decisions;
 mod fixture_diagnosis;
 mod fixture_diagnosis_trials;
 mod fixture_drive;
