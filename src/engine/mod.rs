@@ -421,10 +421,7 @@ impl Inner {
     }
 
     fn afford(&self, cost: Cost) -> Result<(), Error> {
-        let (limit, limit_bytes) = (self.settings.cost_limit, self.settings.cost_limit_bytes);
-        // An estimate that is no number is not below the limit.
-        let affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
-        if affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
+        affordable(cost, self.settings.cost_limit, self.settings.cost_limit_bytes)
     }
 
     /// Whether an owner may ask for so much work in an hour at all.
@@ -501,6 +498,13 @@ impl Inner {
     }
 }
 
+/// Whether a job may cost so much.
+fn affordable(cost: Cost, limit: Duration, limit_bytes: u64) -> Result<(), Error> {
+    // An estimate that is no number is not below the limit.
+    let is_affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
+    if is_affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
+}
+
 fn outcome(kept: Kept) -> Result<Arc<Stored>, Error> {
     match kept {
         Kept::Answer(stored) => Ok(stored),
@@ -561,7 +565,8 @@ pub fn check_with(registry: &Registry, calculator: &str, body: Body, given: &Giv
     guarded(|| given.read(registry, &entry, &body)?.into_checked())
 }
 
-/// The answer to a job in this thread, without cache, store or limit of cost: for the command line.
+/// The answer to a job in this thread, without cache or store: for the command line. A job is refused for its cost as by a service
+/// with the usual limits.
 #[allow(clippy::needless_pass_by_value)]
 pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
     solve_with(registry, calculator, body, &Given::default(), monitor)
@@ -577,5 +582,9 @@ pub fn solve_with(
     monitor: &dyn Monitor,
 ) -> Result<Stored, Error> {
     let entry = entry(registry, calculator)?;
-    guarded(|| compute(&given.read(registry, &entry, &body)?, monitor))
+    guarded(|| {
+        let ready = given.read(registry, &entry, &body)?;
+        affordable(ready.prepared.cost, settings::COST_LIMIT, settings::COST_LIMIT_BYTES)?;
+        compute(&ready, monitor)
+    })
 }

@@ -59,6 +59,10 @@ pub struct EngineSettings {
     pub patience: Duration,
 }
 
+/// What one job may take where nothing else is set.
+pub(super) const COST_LIMIT: Duration = Duration::from_hours(1);
+pub(super) const COST_LIMIT_BYTES: u64 = 1 << 30;
+
 impl EngineSettings {
     /// The defaults, with the database in `data`.
     pub fn in_folder(data: impl Into<PathBuf>) -> Self {
@@ -74,8 +78,8 @@ impl EngineSettings {
             store_bytes: 1 << 30,
             store_age: Duration::from_hours(30 * 24),
             direct_limit: Duration::from_millis(500),
-            cost_limit: Duration::from_hours(1),
-            cost_limit_bytes: 1 << 30,
+            cost_limit: COST_LIMIT,
+            cost_limit_bytes: COST_LIMIT_BYTES,
             queue_limit: 10_000,
             job_slots: Self::job_slots_of(cores),
             short_limit: Duration::from_secs(5),

@@ -176,6 +176,13 @@ async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
     let finding = Finding::new("too_expensive", cost.driver).measured(cost.ms, 1e4, "ms");
     Texts::shared().try_finding(Language::En, "fault", &finding).unwrap();
     engine.solve(TOY, work(10_000.0)).await.unwrap();
+    // Without an engine, on the command line, the usual limit holds.
+    let hour_ms = super::settings::COST_LIMIT.as_secs_f64() * 1e3;
+    let refused = solve_now(engine.registry(), TOY, work(1.01 * hour_ms), &Unwatched).unwrap_err();
+    assert!(
+        matches!(refused, Error::TooExpensive { limit, .. } if limit == super::settings::COST_LIMIT),
+        "{refused:?}"
+    );
 }
 
 /// A calculation that does not end.

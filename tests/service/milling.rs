@@ -42,6 +42,7 @@ async fn a_slow_cut_is_refused_in_words_that_help() {
     let server = Server::start_of(Registry::standard().unwrap(), |_| {}).await;
     let mut job = example("island");
     job["cut"]["spindle_speed_rpm"] = json!(0.1);
+    job["analyses"] = json!(["proposals"]);
     for (language, said) in [("en", "ask from 9 rev/min on"), ("ru", "задайте не меньше 9 об/мин")]
     {
         let request = server.post_to(ROOM, job.to_string()).header("accept-language", language);
@@ -51,7 +52,7 @@ async fn a_slow_cut_is_refused_in_words_that_help() {
         assert!(error["detail"].as_str().unwrap().contains(said), "{error}");
     }
     // What it advises is answered.
-    job["analyses"] = json!([]);
+    job["analyses"] = json!(["verdict", "intervals", "motion"]);
     assert_eq!(server.post_to(ROOM, job.to_string()).send().await.unwrap().status(), 200);
     job["analyses"] = json!(["verdict"]);
     job["cut"]["spindle_speed_rpm"] = json!(30);

@@ -182,7 +182,7 @@ fn chatter_is_said_where_a_disturbance_grows() {
             if let (Some(have), Some(want)) = (got.multiplier.settling_time_s, settles) {
                 close(have, want, 1e-9);
                 let slowly = said(&answer, "fixture_settles_slowly").is_some();
-                assert_eq!(slowly, !got.simulation.settled, "{kind} {share}: {modulus}");
+                assert_eq!(slowly, !got.simulation.as_ref().unwrap().settled, "{kind} {share}: {modulus}");
             }
             let code = if state == FixtureState::Stable { "fixture_stable" } else { "fixture_chatters" };
             assert_eq!(answer.explanation[0].code, code);

@@ -49,7 +49,11 @@ fn cut(rpm: f64, depth: f64, law: &str) -> f64 {
         },
         "simulation": { "regeneration": law },
     }));
-    if got.multiplier.modulus < 1.0 { got.forced.peak_to_peak_um } else { got.simulation.peak_to_peak_um }
+    if got.multiplier.modulus < 1.0 {
+        got.forced.peak_to_peak_um
+    } else {
+        got.simulation.as_ref().unwrap().peak_to_peak_um
+    }
 }
 
 /// The truth of [`cut`]: C1 + C2, and 1000 (lambda1 + lambda2)/(2 sqrt(1000 (C1 + C2) m)).

@@ -113,7 +113,7 @@ fn growth(job: &Value, periods: u32) -> f64 {
         }),
     );
     job["analyses"] = json!(["history"]);
-    outcome(&job).simulation.sample_scatter
+    outcome(&job).simulation.as_ref().unwrap().sample_scatter
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn small_disturbances_grow_and_decay_as_the_multiplier_says() {
             assert!((rate - modulus.ln()).abs() < within, "{kind} {share}: {rate}, {}", modulus.ln());
         }
         let above = outcome(&with(&base, "/cut/depth_mm", json!(1.02 * limit)));
-        assert!(above.multiplier.modulus > 1.0 && !above.simulation.settled, "{kind}");
+        assert!(above.multiplier.modulus > 1.0 && !above.simulation.as_ref().unwrap().settled, "{kind}");
         let below = outcome(&with(&base, "/cut/depth_mm", json!(0.98 * limit)));
-        assert!(below.multiplier.modulus < 1.0 && below.simulation.settled, "{kind}");
+        assert!(below.multiplier.modulus < 1.0 && below.simulation.as_ref().unwrap().settled, "{kind}");
     }
 }
 
@@ -146,7 +146,7 @@ fn marching_tends_to_the_forced_motion_with_the_square_of_the_step() {
         let forced = outcome(&job).forced;
         let error = |steps: u32| {
             let settings = json!({ "steps_per_tooth": steps, "tooth_periods": 200, "steady_tooth_periods": 40 });
-            outcome(&with(&job, "/simulation", settings)).simulation.peak_to_peak_um - forced.peak_to_peak_um
+            outcome(&with(&job, "/simulation", settings)).simulation.unwrap().peak_to_peak_um - forced.peak_to_peak_um
         };
         let (coarse, fine) = (error(200), error(800));
         // 20 steps to an oscillation, then 80: order 2 has 16 times less; half of that leaves room for the next order.
@@ -162,14 +162,17 @@ fn both_feed_directions_have_one_multiplier_and_mirrored_motion() {
         let (movable, fixed) = (toward("movable_jaw"), toward("fixed_jaw"));
         assert_eq!(movable.multiplier, fixed.multiplier);
         assert_eq!(movable.forced.displacement_max_um, -fixed.forced.displacement_min_um);
-        assert_eq!(movable.simulation.displacement_max_um, -fixed.simulation.displacement_min_um);
+        assert_eq!(
+            movable.simulation.as_ref().unwrap().displacement_max_um,
+            -fixed.simulation.as_ref().unwrap().displacement_min_um
+        );
     }
 }
 
 #[test]
 fn both_laws_of_regeneration_agree_while_no_tooth_leaves_the_cut() {
     let job = reference_job(1);
-    let of = |law: &str, job: &Value| outcome(&with(job, "/simulation/regeneration", json!(law))).simulation;
+    let of = |law: &str, job: &Value| outcome(&with(job, "/simulation/regeneration", json!(law))).simulation.unwrap();
     // To the order of rounding: the same chips are computed along two ways.
     let (multiple, single) = (of("multiple", &job), of("single", &job));
     assert!((multiple.peak_to_peak_um - single.peak_to_peak_um).abs() < 1e-9, "{multiple:?} {single:?}");
@@ -185,8 +188,8 @@ fn joints_that_stay_closed_run_as_bonded_ones() {
         for (depth, law) in [(3.0, "multiple"), (5.0, "multiple"), (5.0, "single")] {
             let mut job = with(&reference_job(kind), "/cut/depth_mm", json!(depth));
             job["simulation"] = json!({ "regeneration": law, "tooth_periods": 100 });
-            let bonded = outcome(&job).simulation;
-            let held = outcome(&with(&job, "/fixture/clamp_force_n", json!(1e8))).simulation;
+            let bonded = outcome(&job).simulation.unwrap();
+            let held = outcome(&with(&job, "/fixture/clamp_force_n", json!(1e8))).simulation.unwrap();
             assert!(held.unilateral && !bonded.unilateral);
             assert_eq!(precut_calc::fixture_stability::Simulated { unilateral: true, ..bonded }, held, "{kind} {law}");
         }
@@ -242,7 +245,7 @@ fn a_forced_depth_follows_its_power_law() {
 fn without_depth_nothing_moves_and_the_free_vise_decays() {
     for kind in [1, 2] {
         let got = outcome(&with(&reference_job(kind), "/cut/depth_mm", json!(0)));
-        assert_eq!((got.forced.peak_to_peak_um, got.simulation.peak_to_peak_um), (0.0, 0.0));
+        assert_eq!((got.forced.peak_to_peak_um, got.simulation.as_ref().unwrap().peak_to_peak_um), (0.0, 0.0));
         // The slowest mode's decay over a tooth period.
         let tau = 1.0 / got.engagement.tooth_frequency_hz;
         let decay = got
@@ -299,12 +302,16 @@ fn an_open_joint_keeps_the_preload_of_the_other() {
     job["fixture"]["clamp_force_n"] = json!(500);
     job["cut"]["depth_mm"] = json!(2.0);
     let got = outcome(&job);
-    let mean = 0.5 * (got.simulation.force_max_n + got.simulation.force_min_n);
+    let mean = 0.5 * (got.simulation.as_ref().unwrap().force_max_n + got.simulation.as_ref().unwrap().force_min_n);
     assert!(mean > 500.0 * 36.0 / 30.0, "{mean} does not open the joint");
-    let x = 0.5 * (got.simulation.displacement_max_um + got.simulation.displacement_min_um);
+    let x = 0.5
+        * (got.simulation.as_ref().unwrap().displacement_max_um + got.simulation.as_ref().unwrap().displacement_min_um);
     let wanted = (mean - 500.0) / 6000.0 * 1e3;
     // The force of ten teeth in cut ripples by a percent.
-    assert!(got.simulation.open_fixed_share > 0.99 && (x / wanted - 1.0).abs() < 0.02, "{x} {wanted}");
+    assert!(
+        got.simulation.as_ref().unwrap().open_fixed_share > 0.99 && (x / wanted - 1.0).abs() < 0.02,
+        "{x} {wanted}"
+    );
 }
 
 #[test]
@@ -312,9 +319,13 @@ fn halving_the_step_changes_the_chatter_little() {
     let mut job = with(&reference_job(1), "/cut/depth_mm", json!(5.0));
     job["simulation"] = json!({ "verified": true });
     let got = outcome(&job);
-    let change = got.simulation.halved_step_change_um.unwrap();
+    let change = got.simulation.as_ref().unwrap().halved_step_change_um.unwrap();
     // 80 steps to an oscillation: 0.3 %.
-    assert!(change < 0.005 * got.simulation.peak_to_peak_um, "{change} of {}", got.simulation.peak_to_peak_um);
+    assert!(
+        change < 0.005 * got.simulation.as_ref().unwrap().peak_to_peak_um,
+        "{change} of {}",
+        got.simulation.as_ref().unwrap().peak_to_peak_um
+    );
     assert_eq!(got.verdict.peak_to_peak_error_um, Some(change));
 }
 
@@ -362,7 +373,7 @@ fn the_largest_of_many_multipliers_is_found() {
 fn hard_cases_are_answered() {
     let base = reference_job(2);
     for (pointer, value) in [
-        ("/cut/spindle_speed_rpm", json!(30)),
+        ("/cut/spindle_speed_rpm", json!(75)),
         ("/fixture/jaw_mass_kg", json!(0.005)),
         ("/cutter/teeth", json!(1)),
         ("/cutter/teeth", json!(96)),
@@ -377,7 +388,7 @@ fn hard_cases_are_answered() {
             got.multiplier
         );
         // Without a clamp force nothing holds the workpiece, and it walks away.
-        assert_eq!(got.simulation.diverged, value == 0, "{pointer} {value}");
+        assert_eq!(got.simulation.as_ref().unwrap().diverged, value == 0, "{pointer} {value}");
     }
 }
 
@@ -447,7 +458,7 @@ fn no_clamp_force_is_named_for_a_cut_without_a_steady_state() {
         let mut bonded = violent(depth_mm, damping);
         bonded["fixture"].as_object_mut().unwrap().remove("clamp_force_n");
         let answer = solve(&bonded);
-        let run = &answer.output.simulation;
+        let run = &answer.output.simulation.as_ref().unwrap();
         assert_eq!((run.diverged, run.settled), (why == "diverged", false), "{run:?}");
         assert_eq!(run.steady_tooth_periods, run.tooth_periods);
         assert!(run.clamp_fixed_n == run.clamp_fixed_entry_n && run.clamp_fixed_n > 1e5 && run.force_max_n > 1e3);

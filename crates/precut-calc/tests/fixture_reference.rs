@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 /// A number of the answer by its name in the reference, in the reference's unit.
 fn number(case: &Value, name: &str, got: &FixtureOutcome) -> Option<f64> {
     let kind = case["kind"].as_str().unwrap();
-    let (sim, forced, quasi) = (&got.simulation, &got.forced, &got.quasi_static);
+    let (sim, forced, quasi) = (got.simulation.as_ref().unwrap(), &got.forced, &got.quasi_static);
     let clamp = got.clamp.as_ref();
     let of = |forced: f64, simulated: f64| if kind == "time_domain" { simulated } else { forced };
     Some(match name {
@@ -65,7 +65,7 @@ fn tolerance(case: &Value, name: &str, expected: f64) -> f64 {
 
 /// Zero or not: sample counts are compared in no other way.
 fn flags(name: &str, got: &FixtureOutcome) -> Option<bool> {
-    let sim = &got.simulation;
+    let sim = got.simulation.as_ref().unwrap();
     Some(match name {
         "lost_cut_samples" => sim.lost_cut_share > 0.0,
         "open_right_samples" => sim.open_fixed_share > 0.0,

@@ -204,8 +204,8 @@ fn a_cut_turned_about_the_spindle_is_the_same() {
 }
 
 #[test]
-fn a_slow_cut_is_refused_with_the_lowest_speed_that_is_answered() {
-    let slow = json!({ "cutter": { "teeth": 8 }, "cut": { "spindle_speed_rpm": 0.1 }, "analyses": ["verdict"] });
+fn other_cutters_are_not_tried_where_no_multiplier_is_computed() {
+    let slow = json!({ "cutter": { "teeth": 8 }, "cut": { "spindle_speed_rpm": 0.1 }, "analyses": ["proposals"] });
     let job = merged(example("two_modes"), &slow);
     let found = faults(&job);
     assert_eq!(found.len(), 1, "{found:?}");
@@ -215,9 +215,70 @@ fn a_slow_cut_is_refused_with_the_lowest_speed_that_is_answered() {
     };
     let at = |speed: f64| faults(&merged(job.clone(), &json!({ "cut": { "spindle_speed_rpm": speed } }))).len();
     assert_eq!((at(1.001 * lowest), at(0.999 * lowest)), (0, 1));
-    // Forces and the zeroth order are told at any speed.
-    let told = solve(&merged(job, &json!({ "analyses": [] })));
+    // Everything else is told at any speed.
+    let told = solve(&merged(job, &json!({ "analyses": ["verdict", "intervals", "motion"] })));
     assert!(told.outcome.force.torque_mean_n_m > 0.0 && told.outcome.zeroth_order_min_mm.is_some());
+}
+
+/// A slow cut by closed forms: its limit is that of fixture stability, which looks at growth between two teeth by other means, its
+/// motion that of exact elements.
+#[test]
+fn a_slow_cut_is_that_of_fixture_stability() {
+    for (rpm, teeth, depth) in [(0.1, 2, 0.05), (0.5, 4, 0.1), (1.0, 8, 0.3), (5.0, 4, 0.02)] {
+        let vise: Value = json!({
+            "cutter": { "diameter_mm": 10, "teeth": teeth },
+            "force": { "coefficient": 600, "radial_ratio": 0.3 },
+            "cut": { "width_mm": 5, "offset_mm": 0, "depth_mm": depth, "spindle_speed_rpm": rpm, "feed_mm_per_tooth": 0.1 },
+            "fixture": {
+                "kind": "self_locking", "workpiece_mass_kg": 0.03993,
+                "movable_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.0075 },
+                "fixed_joint": { "stiffness_n_per_mm": 670.0248, "damping_n_s_per_mm": 0.0075 }
+            },
+        });
+        let mut job: <FixtureStability as Calculator>::Input = serde_json::from_value(vise.clone()).unwrap();
+        FixtureStability::fill(&mut job);
+        let known = FixtureStability::run(&job, &Unwatched).unwrap().output;
+        let mut same = vise;
+        same["force"] = json!({
+            "kind": "power_law", "coefficient": 600, "radial_ratio": 0.3, "chip_thickness_exponent": 0, "chip_floor_mm": 0
+        });
+        let fixture = same.as_object_mut().unwrap().remove("fixture").unwrap();
+        same["tool"] = json!({ "kind": "rigid" });
+        same["work"] = json!({ "kind": "vise", "fixture": fixture });
+        same["analyses"] = json!(["verdict", "intervals", "motion"]);
+        let told = solve(&same);
+        assert!(told.says("milling_slow_cut") && told.outcome.multiplier.is_none(), "{rpm}");
+        let limit = told.outcome.first_limit_mm.unwrap();
+        // In fixture stability it may grow fifty times before it counts.
+        let beyond = known.chatter_depth_mm.unwrap() / limit - 1.0;
+        assert!(beyond > 0.0 && beyond < 0.2, "{rpm}: {beyond}");
+        let state = told.outcome.verdict.as_ref().unwrap().state;
+        assert_eq!(state == MillingState::Chatter, depth >= limit, "{rpm}: {limit}");
+        let motion = told.outcome.motion.as_ref().unwrap();
+        let swing = motion.x_max_um - motion.x_min_um;
+        assert!((swing / known.forced.peak_to_peak_um - 1.0).abs() < 1e-4, "{rpm}: {swing} {:?}", known.forced);
+    }
+}
+
+/// With the cut as stiff everywhere (a slot of many teeth) the limit of a slow cut is the least of the zeroth order; of an edge in a
+/// helix it is no lower than of a straight one.
+#[test]
+fn the_limit_of_a_slow_cut_is_a_closed_form() {
+    let slow = json!({
+        "cutter": { "teeth": 8, "helix_angle_deg": 0 }, "cut": { "spindle_speed_rpm": 0.5, "width_mm": 31.75 },
+        "analyses": ["verdict", "intervals"]
+    });
+    let slot = solve(&merged(example("two_modes"), &slow)).outcome;
+    let (limit, zeroth) = (slot.first_limit_mm.unwrap(), slot.zeroth_order_min_mm.unwrap());
+    assert!((limit / zeroth - 1.0).abs() < 1e-3, "{limit} {zeroth}");
+    let with = |helix: f64| {
+        let job = merged(example("two_modes"), &slow);
+        let quarter = json!({ "cutter": { "helix_angle_deg": helix }, "cut": { "width_mm": 4.0 } });
+        solve(&merged(job, &quarter)).outcome.first_limit_mm.unwrap()
+    };
+    let (straight, slight, steep) = (with(0.0), with(1.0), with(40.0));
+    // Places between which the stiffest is not looked for tell it to 1e-4.
+    assert!((slight / straight - 1.0).abs() < 1e-4 && steep > straight * (1.0 - 1e-4), "{straight} {slight} {steep}");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::output::{ChatterKind, ClampForce, FirstLimit, FixtureOutcome, Fixture
 use super::plausible::implausible;
 use super::probable_depths;
 use super::simulate::Steady;
+use super::slow::in_a_period;
 
 /// Distance of the tooth frequency (or a harmonic) from a natural frequency that is worth a warning.
 const NEAR_RESONANCE: f64 = 0.1;
@@ -57,6 +58,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "fixture_settles_slowly",
     "fixture_chatters",
     "fixture_vibrates_on",
+    "fixture_grows_within",
+    "fixture_slow_cut",
     "fixture_chip_lost",
     "fixture_joint_opens",
     "fixture_spindle_overloaded",
@@ -143,20 +146,7 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
         let needed = slip.clamp_force_min_n;
         found.push(Finding::new("clamp_slips", "/fixture/clamp_force_n").measured(given, needed, "N"));
     }
-    found.extend(unsteady(aside.cut, "as_given"));
-    // Of a cut without a clamp force both are one run.
-    if outcome.simulation.unilateral || aside.cut == Steady::Reached {
-        found.extend(aside.bonded.and_then(|bonded| unsteady(bonded, "closed")));
-    }
-    let highest = outcome.modes.last().map_or(0.0, |mode| mode.natural_frequency_hz);
-    let per_oscillation = f64::from(outcome.simulation.steps_per_tooth) * tooth / highest;
-    if per_oscillation < COARSEST_STEPS {
-        found.push(Finding::new("simulation_too_coarse", "/simulation/steps_per_tooth").measured(
-            per_oscillation,
-            COARSEST_STEPS,
-            "1",
-        ));
-    }
+    found.extend(of_runs(outcome, aside));
     spindle_warnings(study, outcome, &mut found);
     let multiplier = &outcome.multiplier;
     if (multiplier.modulus - 1.0).abs() < multiplier.modulus_error {
@@ -172,14 +162,30 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
     } else if depth > study.examined_mm {
         found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, study.examined_mm, "mm"));
     }
-    if outcome.verdict.state == FixtureState::Chatter && multiplier.modulus < 1.0 {
-        found.push(Finding::new("verdict_by_simulation", "/simulation").measured(
-            outcome.simulation.sample_scatter,
-            1e-3,
-            "1",
-        ));
+    if let Some(run) = &outcome.simulation
+        && outcome.verdict.state == FixtureState::Chatter
+        && multiplier.modulus < 1.0
+    {
+        found.push(Finding::new("verdict_by_simulation", "/simulation").measured(run.sample_scatter, 1e-3, "1"));
     }
     found.extend(outcome.conformance.as_ref().and_then(conformance::warnings));
+    found
+}
+
+/// What the runs in time are worth; nothing where there were none.
+fn of_runs(outcome: &FixtureOutcome, aside: &Aside) -> Vec<Finding> {
+    let Some(run) = &outcome.simulation else { return Vec::new() };
+    let mut found: Vec<Finding> = aside.cut.and_then(|cut| unsteady(cut, "as_given")).into_iter().collect();
+    // Of a cut without a clamp force both are one run.
+    if run.unilateral || aside.cut == Some(Steady::Reached) {
+        found.extend(aside.bonded.and_then(|bonded| unsteady(bonded, "closed")));
+    }
+    let highest = outcome.modes.last().map_or(0.0, |mode| mode.natural_frequency_hz);
+    let per_oscillation = f64::from(run.steps_per_tooth) * outcome.engagement.tooth_frequency_hz / highest;
+    if per_oscillation < COARSEST_STEPS {
+        let at = "/simulation/steps_per_tooth";
+        found.push(Finding::new("simulation_too_coarse", at).measured(per_oscillation, COARSEST_STEPS, "1"));
+    }
     found
 }
 
@@ -233,21 +239,14 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     let verdict = &outcome.verdict;
     let multiplier = &outcome.multiplier;
     let feed_um = 1e3 * study.case.working.feed_mm;
-    // A motion beyond the model is no fact.
-    let within = verdict.peak_to_peak_um <= 1e3 * MODEL_ENDS * study.case.cutting.radius_mm;
+    // A motion beyond the model is no fact, nor is that about which a slow cut chatters.
+    let known = !study.is_slow || study.stable();
+    let within = known && verdict.peak_to_peak_um <= 1e3 * MODEL_ENDS * study.case.cutting.radius_mm;
     let moving =
         |message: Message| if within { message.with("peak_to_peak_um", verdict.peak_to_peak_um) } else { message };
     let mut said = vec![match verdict.state {
         FixtureState::Stable => moving(Message::new("fixture_stable").with("modulus", multiplier.modulus)),
-        FixtureState::Chatter if aside.settling == Settling::VibratesOn => {
-            moving(Message::new("fixture_vibrates_on").with("modulus", multiplier.modulus))
-        }
-        FixtureState::Chatter => moving(
-            Message::new("fixture_chatters")
-                .with("modulus", multiplier.modulus)
-                .with("frequency_hz", multiplier.chatter_frequency_hz)
-                .with("kind", if multiplier.kind == ChatterKind::Flip { "flip" } else { "hopf" }),
-        ),
+        FixtureState::Chatter => moving(of_chatter(outcome, aside)),
         FixtureState::ChipLost => Message::new("fixture_chip_lost").with("share", verdict.lost_cut_share),
         FixtureState::JointOpen => moving(
             Message::new("fixture_joint_opens")
@@ -259,6 +258,10 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
             moving(Message::new("fixture_spindle_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0)))
         }
     }];
+    if study.is_slow {
+        let (oscillations, _) = in_a_period(&study.case.holding, &study.case.cutting, study.case.working.spindle_rpm);
+        said.push(Message::new("fixture_slow_cut").with("oscillations", oscillations));
+    }
     if let Some(time_s) = multiplier.settling_time_s.filter(|_| aside.settling == Settling::Slowly) {
         said.push(
             Message::new("fixture_settles_slowly")
@@ -327,10 +330,35 @@ pub(super) fn explanation(study: &Study<'_>, outcome: &FixtureOutcome, aside: &A
     said
 }
 
+/// How the cut chatters.
+fn of_chatter(outcome: &FixtureOutcome, aside: &Aside) -> Message {
+    let multiplier = &outcome.multiplier;
+    let (code, is_small) = if aside.settling == Settling::VibratesOn {
+        ("fixture_vibrates_on", true)
+    } else {
+        ("fixture_grows_within", multiplier.modulus < 1.0)
+    };
+    if !is_small {
+        return Message::new("fixture_chatters")
+            .with("modulus", multiplier.modulus)
+            .with("frequency_hz", multiplier.chatter_frequency_hz)
+            .with("kind", if multiplier.kind == ChatterKind::Flip { "flip" } else { "hopf" });
+    }
+    let message = Message::new(code).with("modulus", multiplier.modulus);
+    match multiplier.growth_within {
+        Some(growth) => message.with("growth", growth).with("frequency_hz", multiplier.chatter_frequency_hz),
+        None => message,
+    }
+}
+
 /// What the clamp has to give.
 fn of_clamp(clamp: &ClampForce, aside: &Aside) -> Message {
     let Some(least) = clamp.least_n else {
-        let why = if aside.bonded == Some(Steady::Diverged) { "diverged" } else { "thrown" };
+        let why = match aside.bonded {
+            None => "slow",
+            Some(Steady::Diverged) => "diverged",
+            Some(_) => "thrown",
+        };
         return Message::new("clamp_force_unknown").with("why", why);
     };
     // Nothing is asked: of no force either, so there is neither factor nor inertia to speak of.

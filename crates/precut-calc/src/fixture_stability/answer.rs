@@ -24,8 +24,9 @@ use super::output::{
 use super::parts::plane_of;
 use super::picture::lobes_so_far;
 use super::probable_depths::{ProbableDepths, probable_depths};
-use super::response::{Response, response, span_mm, unbroken};
+use super::response::{Range, Response, response, span_mm, unbroken};
 use super::simulate::{Observed, Steady, count, observed, plan, run, scatter, small};
+use super::slow::is_slow;
 use super::speeds::{ForcedLimits, better_speeds, first_of, forced_limits};
 use super::zeroth::{at_speed, depth_mm, zeroth};
 
@@ -52,6 +53,8 @@ pub(super) struct Study<'a> {
     pub case: Case,
     pub rules: Rules,
     pub monitor: &'a dyn Monitor,
+    /// Hundreds of oscillations from tooth to tooth: closed forms in place of runs in time.
+    pub is_slow: bool,
     pub point: Point,
     pub forced: Response,
     /// How deep limits were to be looked for, and how deep they could be.
@@ -75,8 +78,8 @@ pub(super) enum Settling {
 
 /// What the advice asks beside the answer.
 pub(super) struct Aside {
-    /// What the cut as it was run shows, and what it does with joints that stay closed.
-    pub cut: Steady,
+    /// What the cut as it was run shows, where it was, and what it does with joints that stay closed.
+    pub cut: Option<Steady>,
     pub bonded: Option<Steady>,
     /// Errors of the moduli with the joint at the movable and at the fixed jaw open.
     pub open_errors: [f64; 2],
@@ -92,7 +95,8 @@ impl<'a> Study<'a> {
         let asked_mm = examined_mm(job, &case);
         let limit = critical_depth(&rules, &case.holding, &case.cutting, case.working, asked_mm, monitor)?;
         let ChatterLimit { depth_mm: chatter_mm, examined_mm } = limit;
-        Ok(Self { job, case, rules, monitor, point, forced, asked_mm, examined_mm, chatter_mm })
+        let is_slow = is_slow(&case.holding, &case.cutting, case.working.spindle_rpm);
+        Ok(Self { job, case, rules, monitor, is_slow, point, forced, asked_mm, examined_mm, chatter_mm })
     }
 
     /// Where chatter begins at the working speed.
@@ -101,7 +105,7 @@ impl<'a> Study<'a> {
     }
 
     pub(super) fn stable(&self) -> bool {
-        self.point.multiplier.modulus < 1.0
+        !self.point.multiplier.grows()
     }
 
     /// Depths at which the spindle of the job gives out at a speed; none without one.
@@ -110,8 +114,11 @@ impl<'a> Study<'a> {
         self.job.spindle.as_ref().map_or_else(DriveDepths::default, |of| drive::depths(&self.case, of, working))
     }
 
-    /// Runs the cut in time at the working point.
-    pub(super) fn simulated(&self, unilateral: bool, keep: bool) -> Result<Observed, Failure> {
+    /// Runs the cut in time at the working point; `None` of a slow cut.
+    pub(super) fn simulated(&self, unilateral: bool, keep: bool) -> Result<Option<Observed>, Failure> {
+        if self.is_slow {
+            return Ok(None);
+        }
         let mut plan = plan(&self.case, &self.job.simulation, self.case.working, self.point.multiplier.modulus);
         plan.unilateral = unilateral;
         if keep {
@@ -131,11 +138,12 @@ impl<'a> Study<'a> {
             plan.steady_periods *= LONGER;
             seen = observed(&self.case, &plan, self.monitor)?;
         }
-        Ok(seen)
+        Ok(Some(seen))
     }
 
-    /// What the cut as it was run shows of a disturbance.
-    fn settling(&self, seen: &Observed) -> Settling {
+    /// What the cut as it was run shows of a disturbance; without a run, what the multiplier says.
+    fn settling(&self, seen: Option<&Observed>) -> Settling {
+        let Some(seen) = seen else { return if self.stable() { Settling::AtRest } else { Settling::Grows } };
         let scatter = scatter(&self.case, &seen.plan, &seen.run);
         if !self.stable() {
             Settling::Grows
@@ -202,15 +210,15 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
     monitor.progress(0.05, Message::new("stage_simulation"));
     let keep = job.asks(Analysis::History);
     let cut = study.simulated(case.holding.clamp_force_n.is_some(), keep)?;
-    let mut simulation = simulation(study, &cut);
-    if job.simulation.verified {
+    let mut simulation = cut.as_ref().map(|cut| simulation(study, cut));
+    if let (Some(cut), Some(simulation)) = (&cut, simulation.as_mut().filter(|_| job.simulation.verified)) {
         let finer = Plan { steps_per_tooth: 2 * cut.plan.steps_per_tooth, keep_first: 0, keep_last: 0, ..cut.plan };
         let again = run(case, &finer, *monitor)?;
         simulation.halved_step_change_um = Some((again.x_mm.span() - cut.run.x_mm.span()).abs() * UM_PER_MM);
     }
     checkpoint(*monitor)?;
-    let settling = study.settling(&cut);
-    let mut aside = Aside { cut: cut.steady, bonded: None, open_errors: [0.0; 2], settling };
+    let settling = study.settling(cut.as_ref());
+    let mut aside = Aside { cut: cut.as_ref().map(|cut| cut.steady), bonded: None, open_errors: [0.0; 2], settling };
     let clamp = if job.asks(Analysis::ClampForce) {
         monitor.progress(0.15, Message::new("stage_clamp_force"));
         Some(clamp_force(study, &mut aside)?)
@@ -225,11 +233,14 @@ pub(super) fn outcome(study: &Study<'_>) -> Result<(FixtureOutcome, Aside), Fail
     };
     let lobes = if job.asks(Analysis::Lobes) { Some(lobes(study)?) } else { None };
     let (conformance, probable_depths) = certainty(study)?;
-    let history = keep.then(|| histories(study, &cut.run));
+    let history = cut.as_ref().filter(|_| keep).map(|cut| histories(study, &cut.run));
     let zeroth_order = zeroth_order(study);
     let drive = cutting_drive(study);
     let outcome = FixtureOutcome {
-        verdict: verdict(study, &simulation, &cut.run, settling, drive.margin()),
+        verdict: match simulation.as_ref().zip(cut.as_ref()) {
+            Some((simulation, cut)) => verdict(study, simulation, &cut.run, settling, drive.margin()),
+            None => slow_verdict(study, drive.margin()),
+        },
         engagement: engagement(study),
         quasi_static: quasi_static(case),
         drive,
@@ -377,11 +388,15 @@ fn multiplier(study: &Study<'_>) -> FloquetMultiplier {
         imaginary: found.im.abs(),
         tooth_periods: small(found.phases),
         kind,
-        chatter_frequency_hz: chatter_frequency_hz(&study.case, &found),
+        chatter_frequency_hz: match found.slow {
+            Some(slow) => slow.frequency_hz,
+            None => chatter_frequency_hz(&study.case, &found),
+        },
         // A disturbance that vanishes within a tooth period decays at no finite rate: 1e-300 stands for it.
         growth_per_s: found.modulus.max(1e-300).ln() / tau,
         settling_time_s: (found.modulus < 1.0).then(|| DECAYED.ln() / found.modulus.max(1e-300).ln() * tau),
         modulus_error: study.point.error,
+        growth_within: found.slow.map(|slow| slow.within),
     }
 }
 
@@ -491,6 +506,47 @@ fn verdict(
     }
 }
 
+/// Of a slow cut: the forced motion, which is the motion about which it chatters where it does.
+fn slow_verdict(study: &Study<'_>, drive_margin: Option<f64>) -> FixtureVerdict {
+    let (case, forced) = (&study.case, &study.forced);
+    let span_um = forced.x_mm.span() * UM_PER_MM;
+    let opens = |of: Range| case.holding.clamp_force_n.is_some_and(|force| case.above_round_off_n(of.high) > force);
+    let joint = match (opens(forced.left_elastic_n), opens(forced.right_elastic_n)) {
+        (true, true) => Some(OpenJoint::Both),
+        (true, false) => Some(OpenJoint::Movable),
+        (false, true) => Some(OpenJoint::Fixed),
+        (false, false) => None,
+    };
+    let state = if joint.is_some() {
+        FixtureState::JointOpen
+    } else if !study.stable() {
+        FixtureState::Chatter
+    } else if drive_margin.is_some_and(|margin| margin < 1.0) {
+        FixtureState::SpindleOverloaded
+    } else {
+        FixtureState::Stable
+    };
+    let asked = case.above_round_off_n(forced.left_n.high.max(forced.right_n.high));
+    FixtureVerdict {
+        state,
+        joint,
+        first_opening_s: None,
+        open_share: 0.0,
+        lost_cut_share: 0.0,
+        peak_to_peak_um: span_um,
+        peak_to_peak_over_feed: forced.x_mm.span() / case.working.feed_mm,
+        peak_to_peak_error_um: study.stable().then_some(SAMPLING * span_um),
+        displacement_max_um: forced.x_mm.high.abs().max(forced.x_mm.low.abs()) * UM_PER_MM,
+        depth_margin: study.chatter_mm.filter(|_| case.working.depth_mm > 0.0).map(|h| h / case.working.depth_mm),
+        clamp_margin: case
+            .holding
+            .clamp_force_n
+            .filter(|_| study.stable() && joint.is_none() && asked > 0.0)
+            .map(|force| force / asked),
+        drive_margin,
+    }
+}
+
 /// What one depth gives with joints that stay closed.
 #[derive(Clone, Copy)]
 struct AtDepth {
@@ -510,7 +566,7 @@ fn at_depth(study: &Study<'_>, depth: f64) -> Result<Option<AtDepth>, Failure> {
     }
     let found = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH, study.monitor)?;
     let modulus = found.multiplier.modulus;
-    if modulus < 1.0 {
+    if study.is_slow || modulus < 1.0 {
         let forced = forced(case, working, study.monitor)?;
         return Ok(Some(AtDepth {
             modulus,

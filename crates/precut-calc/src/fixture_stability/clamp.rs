@@ -6,8 +6,9 @@ use super::acting::Case;
 use super::answer::{Aside, Study};
 use super::holding::Closed;
 use super::lobes::point;
+use super::march::Marched;
 use super::output::{ClampForce, OpenJoint, PushedAlong, SlipForce, TextbookForce};
-use super::simulate::{Observed, Steady};
+use super::simulate::Steady;
 use super::slip::{Pushing, along, steady_n};
 
 /// Safety factors that textbooks use.
@@ -27,22 +28,22 @@ fn static_clamp_n(case: &Case, high_n: f64, low_n: f64) -> (f64, f64) {
 pub(super) fn clamp_force(study: &Study<'_>, aside: &mut Aside) -> Result<ClampForce, Failure> {
     let case = &study.case;
     let stable = study.stable();
-    let Observed { run, steady, .. } = study.simulated(false, false)?;
-    aside.bonded = Some(steady);
-    let is_seen = steady == Steady::Reached;
+    let seen = study.simulated(false, false)?;
+    aside.bonded = seen.as_ref().map(|seen| seen.steady);
+    let run = seen.as_ref().filter(|seen| seen.steady == Steady::Reached).map(|seen| &seen.run);
     let asked = if stable {
         let forced = &study.forced;
         Some([forced.left_n, forced.right_n, forced.left_elastic_n, forced.right_elastic_n])
     } else {
         // A run that shows no steady state says of no clamp force that it is enough.
-        is_seen.then_some([run.left_n, run.right_n, run.left_elastic_n, run.right_elastic_n])
+        run.map(|run| [run.left_n, run.right_n, run.left_elastic_n, run.right_elastic_n])
     };
     let asked = asked.map(|ranges| ranges.map(|range| case.above_round_off_n(range.high)));
     let least_n = asked.map(|[movable, fixed, ..]| movable.max(fixed));
-    let with_entry = |least: f64| {
+    let with_entry = |(least, run): (f64, &Marched)| {
         [run.left_entry_n, run.right_entry_n].map(|n| case.above_round_off_n(n)).into_iter().fold(least, f64::max)
     };
-    let least_with_entry_n = least_n.filter(|_| is_seen).map(with_entry);
+    let least_with_entry_n = least_n.zip(run).map(with_entry);
     let (high, low) = case.cutting.static_extremes_n(case.working.feed_mm, case.working.depth_mm);
     let (static_movable_n, static_fixed_n) = static_clamp_n(case, high, low);
     let static_n = static_movable_n.max(static_fixed_n);

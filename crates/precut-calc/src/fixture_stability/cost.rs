@@ -6,6 +6,7 @@ use super::acting::Case;
 use super::input::{Analysis, FixtureJob};
 use super::probable_depths::{BOUNDARIES, LEAST_SPEEDS, scales};
 use super::simulate;
+use super::slow::{in_a_period, is_slow};
 
 /// Oscillations in a tooth period from which on one Krylov space does not suffice for most multipliers, how their time then grows
 /// with them, and how much it is at most: that of all restarts. Measured with 20 to 540 oscillations.
@@ -21,6 +22,11 @@ const POINT_BYTES: f64 = 700.0;
 const PIECE_BYTES: f64 = 250.0;
 const STEP_BYTES: f64 = 100.0;
 const PLACE_BYTES: f64 = 24.0;
+/// A multiplier of a slow cut with one, two and three masses, and a piece of the forced motion, ms.
+const SLOW_MS: [f64; 3] = [1.0, 4.0, 10.0];
+const PIECE_MS: f64 = 0.0005;
+/// Steps of a range of speeds over which the mean multiplier is taken.
+const RANGE: u32 = 16;
 /// Multipliers of a speed of a boundary.
 const OF_BOUNDARY: f64 = 45.0;
 /// Vises that are tried for a probability; probabilities that are found for the analysis `certainty`.
@@ -46,6 +52,17 @@ impl<'a> Points<'a> {
         self.highest_hz * self.case.cutting.tooth_period_s(spindle_rpm)
     }
 
+    fn is_slow(&self, spindle_rpm: f64) -> bool {
+        is_slow(&self.case.holding, &self.case.cutting, spindle_rpm)
+    }
+
+    /// Pieces of the forced motion: of a slow cut those in which what an entry or exit sets off dies out.
+    fn pieces(&self, spindle_rpm: f64) -> f64 {
+        let (oscillations, decays) = in_a_period(&self.case.holding, &self.case.cutting, spindle_rpm);
+        let followed = if self.is_slow(spindle_rpm) { (2.0 * 18.5 / decays).min(1.0) } else { 1.0 };
+        self.case.cutting.phases() as f64 * (240.0 + 48.0 * oscillations * followed)
+    }
+
     fn history(&self, spindle_rpm: f64) -> f64 {
         24.0 + 14.0 * self.oscillations(spindle_rpm)
     }
@@ -53,6 +70,9 @@ impl<'a> Points<'a> {
     /// A multiplier costs about 1 us per point of its history and 10 us besides, some hundred times as much where the cutter turns
     /// so slowly that hundreds of oscillations go into a tooth period.
     fn multiplier_ms(&self, spindle_rpm: f64) -> f64 {
+        if self.is_slow(spindle_rpm) {
+            return SLOW_MS[(self.case.holding.states() / 2).min(3) - 1];
+        }
         let restarted = (self.oscillations(spindle_rpm) / ONE_SPACE).powf(RESTARTS_GROW);
         let of_phases = 0.7 + 0.3 * self.case.cutting.phases() as f64;
         let per_point = 0.0006 * of_phases * restarted.clamp(1.0, ALL_RESTARTS);
@@ -89,7 +109,8 @@ pub(super) fn cost(job: &FixtureJob) -> Cost {
         job.simulation.steps_per_tooth.map_or_else(|| simulate::steps_per_tooth(&case, working) as f64, f64::from);
     let teeth = case.cutting.stretches().iter().map(|stretch| stretch.teeth).max().unwrap_or(0) as f64;
     let step_ms = 6e-5 + 2.5e-5 * (teeth - 2.0).max(0.0);
-    let run_ms = steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * step_ms;
+    let is_slow = points.is_slow(working);
+    let run_ms = if is_slow { 0.0 } else { steps * job.simulation.tooth_periods.map_or(400.0, f64::from) * step_ms };
     // A better speed is tried before it is named.
     let more = [Analysis::ClampForce, Analysis::Lobes].into_iter().filter(|of| job.asks(*of)).count();
     let runs = 1.0 + f64::from(u8::from(job.simulation.verified)) * 2.0 + more as f64;
@@ -97,31 +118,37 @@ pub(super) fn cost(job: &FixtureJob) -> Cost {
         (2.0 + 100.0 * points.multiplier_ms(working), "/cut/spindle_speed_rpm"),
         (runs * run_ms, "/simulation/tooth_periods"),
     ];
-    if case.cutting.uneven() {
+    parts.push((PIECE_MS * points.pieces(working), "/cut/spindle_speed_rpm"));
+    if case.cutting.uneven() && !is_slow {
         parts.push((UNEVEN_MS * phases * phases * points.history(working), "/cutter/teeth"));
     }
     if job.asks(Analysis::Limits) {
-        parts.push((0.6 * f64::from(job.limits.depths) * run_ms, "/limits/depths"));
+        let each_ms =
+            if is_slow { 2.0 * points.multiplier_ms(working) + PIECE_MS * points.pieces(working) } else { 0.0 };
+        parts.push((f64::from(job.limits.depths) * (0.6 * run_ms + each_ms), "/limits/depths"));
+        for speed in &job.limits.speeds_rpm {
+            parts.push((OF_BOUNDARY * points.multiplier_ms(speed.0), "/limits/speeds_rpm"));
+        }
     }
     let kept = if job.asks(Analysis::History) { 2.0 * case.cutting.teeth.clamp(4, 40) as f64 } else { 0.0 };
-    let pieces = phases * (240.0 + 48.0 * points.oscillations(working));
-    let held = POINT_BYTES * phases.sqrt() * points.history(working)
-        + PIECE_BYTES * pieces
+    let of_run = POINT_BYTES * phases.sqrt() * points.history(working)
         + steps * (STEP_BYTES * kept + PLACE_BYTES * (1.0 + teeth));
+    let held = PIECE_BYTES * points.pieces(working) + if is_slow { 0.0 } else { of_run };
     // Of what no number of bytes holds the most.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let mut bytes = 400_000_u64.saturating_add(held as u64);
     let from = job.lobes.from_rpm.unwrap_or(0.5 * working);
     let to = job.lobes.to_rpm.unwrap_or(2.0 * working).max(from);
-    // Slow speeds have long histories: the mean of 1/n over the range.
-    let mean = if to > from { (to - from) / (to / from).ln() } else { from };
+    // Slow speeds have long histories.
+    let mean_ms = (0..=RANGE).map(|k| points.multiplier_ms(from + (to - from) * f64::from(k) / f64::from(RANGE)));
+    let mean_ms = mean_ms.sum::<f64>() / f64::from(RANGE + 1);
     let speeds = f64::from(job.lobes.speeds);
     if job.asks(Analysis::Lobes) {
-        parts.push((speeds * OF_BOUNDARY * points.multiplier_ms(mean), "/lobes/speeds"));
+        parts.push((speeds * OF_BOUNDARY * mean_ms, "/lobes/speeds"));
         if job.lobes.map {
             let refined = 1.0 + 0.3 * f64::from(job.lobes.refinement);
             let of_map = speeds * f64::from(job.lobes.depths) * refined;
-            parts.push((of_map * points.multiplier_ms(mean), "/lobes/depths"));
+            parts.push((of_map * mean_ms, "/lobes/depths"));
             bytes += 40 * u64::from(job.lobes.speeds) * u64::from(job.lobes.depths);
         }
     }
@@ -129,7 +156,7 @@ pub(super) fn cost(job: &FixtureJob) -> Cost {
         parts.push((PROBABILITIES * points.probability_ms(), "/analyses"));
         if scales(&case) {
             let traced = BOUNDARIES as f64 * speeds.max(LEAST_SPEEDS as f64);
-            parts.push((traced * OF_BOUNDARY * points.multiplier_ms(mean), "/lobes/speeds"));
+            parts.push((traced * OF_BOUNDARY * mean_ms, "/lobes/speeds"));
         }
     } else if tells_probability(&case) {
         parts.push((points.probability_ms(), "/uncertainty"));

@@ -12,6 +12,7 @@ use crate::num::dde::{Matrix, PeriodMap, Propagator, Rule, exponential, largest_
 
 use super::cutting::{Cutting, Stretch};
 use super::holding::System;
+use super::slow::Slowly;
 
 /// Longest element times the largest eigenvalue of A.
 const LONGEST: f64 = 3.5;
@@ -36,6 +37,8 @@ pub(super) struct Multiplier {
     pub phases: usize,
     /// Residual of the eigenvalue over its modulus.
     pub residual: f64,
+    /// Of a slow cut.
+    pub slow: Option<Slowly>,
 }
 
 /// Stiffness over time that the forced motion itself brings (hardening joints), N/mm: at a time in s since a period of the force began.
@@ -195,6 +198,7 @@ impl<const N: usize, const P: usize> SpeedPlan<N, P> {
             modulus,
             phases: self.phases,
             residual: found.residual,
+            slow: None,
         }))
     }
 }

@@ -219,7 +219,7 @@ impl Complex {
     }
 }
 
-fn eigenvalues<const N: usize>(a: &Matrix<N>) -> Vec<(f64, f64)> {
+pub(super) fn eigenvalues<const N: usize>(a: &Matrix<N>) -> Vec<(f64, f64)> {
     let matrix = DMatrix::from_fn(N, N, |i, j| a[i][j]);
     matrix.complex_eigenvalues().iter().map(|value| (value.re, value.im)).collect()
 }

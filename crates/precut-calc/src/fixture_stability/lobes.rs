@@ -11,6 +11,7 @@ use super::cutting::Cutting;
 use super::floquet::{Multiplier, SpeedPlan, Working};
 use super::holding::{Closed, Holding, System};
 use super::response::{Response, response, unbroken};
+use super::slow::{SlowCut, is_slow, slow_point};
 
 /// Points of an element for maps: |mu| to 2e-5 near 1; and for single points: to about 1e-10.
 const COARSE: usize = 8;
@@ -93,6 +94,10 @@ fn point_of<const N: usize>(
     closed: Closed,
     monitor: &dyn Monitor,
 ) -> Result<Point, Failure> {
+    if is_slow(holding, cutting, working.spindle_rpm) {
+        let (multiplier, error) = slow_point::<N>(holding, cutting, working, closed, monitor)?;
+        return Ok(Point { multiplier, error });
+    }
     let system = holding.system::<N>(closed);
     let fine = at::<N, FINE>(&rules.fine, &system, holding, cutting, working, (closed, FINE_RESIDUAL), monitor)?;
     let check = at::<N, CHECK>(&rules.check, &system, holding, cutting, working, (closed, FINE_RESIDUAL), monitor)?;
@@ -167,6 +172,8 @@ struct Column<'a, const N: usize, const P: usize> {
     working: Working,
     /// Shared by all depths where nothing but the level depends on the depth.
     plan: Option<SpeedPlan<N, P>>,
+    is_slow: bool,
+    slow: Option<SlowCut<N>>,
     residual: f64,
     monitor: &'a dyn Monitor,
 }
@@ -182,13 +189,24 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         monitor: &'a dyn Monitor,
     ) -> Result<Self, Failure> {
         let shared = cutting.process_damping_n_per_mm <= 0.0 && holding.hardening_per_mm2 <= 0.0;
-        let plan = shared.then(|| SpeedPlan::new(rule, system, cutting, working, None, monitor)).transpose()?;
-        Ok(Self { rule, system, holding, cutting, working, plan, residual, monitor })
+        let is_slow = is_slow(holding, cutting, working.spindle_rpm);
+        let planned = shared && !is_slow;
+        let plan = planned.then(|| SpeedPlan::new(rule, system, cutting, working, None, monitor)).transpose()?;
+        let slow = (shared && is_slow).then(|| SlowCut::new(system, holding, cutting, working));
+        Ok(Self { rule, system, holding, cutting, working, plan, is_slow, slow, residual, monitor })
     }
 
     /// `None` where joints harden and no forced motion is found about which to ask.
     fn modulus(&self, depth_mm: f64) -> Result<Option<f64>, Failure> {
         let level = self.cutting.level(depth_mm);
+        if self.is_slow {
+            let there = || SlowCut::new(self.system, self.holding, self.cutting, Working { depth_mm, ..self.working });
+            let found = self
+                .slow
+                .as_ref()
+                .map_or_else(|| there().multiplier(level, self.monitor), |slow| slow.multiplier(level, self.monitor));
+            return Ok(Some(found?.0.counted()));
+        }
         let found = if let Some(plan) = &self.plan {
             plan.multiplier(level, self.residual, self.monitor)?
         } else {

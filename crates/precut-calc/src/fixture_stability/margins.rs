@@ -28,7 +28,7 @@ const MOST_FEEDS: usize = 4;
 impl PreparedFixture {
     fn log_modulus(&self, case: &Case, working: Working, monitor: &dyn Monitor) -> Result<f64, Failure> {
         let found = point(&self.rules, &case.holding, &case.cutting, working, Closed::BOTH, monitor)?;
-        Ok(found.multiplier.modulus.max(f64::MIN_POSITIVE).ln())
+        Ok(found.multiplier.counted().max(f64::MIN_POSITIVE).ln())
     }
 
     /// g = d ln|mu|/d ln H of the base where chatter begins at the speed and feed of these rows; 1 where it never does.

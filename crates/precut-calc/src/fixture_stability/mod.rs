@@ -41,6 +41,7 @@ mod response;
 mod settled;
 mod simulate;
 mod slip;
+mod slow;
 mod speeds;
 mod uncertain;
 mod zeroth;
@@ -90,7 +91,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \
@@ -202,6 +203,11 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
         Basis { equation: "fixture/5.5", source: "exact propagation between steps, joints by event" },
         Basis { equation: "fixture/5.6", source: "elastic and viscous force of the joints" },
     ];
+    let is_slow = |case: Case| slow::is_slow(&case.holding, &case.cutting, case.working.spindle_rpm);
+    if Case::of(job).is_some_and(is_slow) {
+        used.retain(|basis| basis.equation != "fixture/5.1" && basis.equation != "fixture/5.5");
+        used.push(Basis { equation: "fixture/5.9", source: "adiabatic theorem on the equation without a delay" });
+    }
     if job.asks(Analysis::ClampForce) {
         used.push(Basis { equation: "fixture/5.7", source: "statics of the clamped workpiece" });
     }

@@ -22,7 +22,8 @@ pub struct FixtureOutcome {
     pub modes: Vec<VibrationMode>,
     /// The largest Floquet multiplier of the motion with both joints closed.
     pub multiplier: FloquetMultiplier,
-    /// Depth at which chatter begins at this speed; null where none begins up to `depth_examined_mm`.
+    /// Depth at which chatter begins at this speed, of a slow cut also by growth between two teeth; null where none begins up to
+    /// `depth_examined_mm`.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub chatter_depth_mm: Option<f64>,
     /// Depth up to which limits were looked for.
@@ -32,8 +33,8 @@ pub struct FixtureOutcome {
     pub zeroth_order: ZerothOrder,
     /// The exact forced motion with both joints closed. It is what is seen while the motion is stable.
     pub forced: ForcedMotion,
-    /// The cut in time, from the entry on.
-    pub simulation: Simulated,
+    /// The cut in time, from the entry on; null of a slow cut, hundreds of oscillations from tooth to tooth, which closed forms describe.
+    pub simulation: Option<Simulated>,
     /// Least clamp force; only with the analysis `clamp_force`.
     pub clamp: Option<ClampForce>,
     /// Limits of the depth; only with the analysis `limits`.
@@ -260,9 +261,13 @@ pub struct FloquetMultiplier {
     /// Time in which a disturbance falls to a thousandth; null where none decays.
     #[schema(extensions(("x-unit" = json!("s"))))]
     pub settling_time_s: Option<f64>,
-    /// Estimated error of the modulus: two orders compared, and the residual of the eigenvalue.
+    /// Estimated error of the modulus: two orders compared, and the residual of the eigenvalue; of a slow cut that of its closed form.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub modulus_error: f64,
+    /// Of a slow cut: how many times a steady ripple grows at most between two teeth; from fifty on the cut counts as chattering.
+    /// At most 1e300 is told.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub growth_within: Option<f64>,
 }
 
 /// What a loss of stability looks like.

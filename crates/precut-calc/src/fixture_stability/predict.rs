@@ -165,7 +165,7 @@ impl PreparedFixture {
     fn instability(&self, case: &Case, monitor: &dyn Monitor) -> Result<Option<Missing>, Failure> {
         let found = point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH, monitor);
         Ok(match or_missing(found)? {
-            Ok(point) => (point.multiplier.modulus >= 1.0).then_some(Missing::Unstable),
+            Ok(point) => point.multiplier.grows().then_some(Missing::Unstable),
             Err(missing) => Some(missing),
         })
     }

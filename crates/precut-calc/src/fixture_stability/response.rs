@@ -7,13 +7,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::calculator::{Failure, Finding, Monitor, Pace};
-use crate::num::dde::{Matrix, Propagator, Rule, times};
+use crate::num::dde::{Matrix, Propagator, Rule, norm, times};
 
 use super::answering::{AnsweringMotion, Effort, NoMotion, answering_motion};
 use super::cutting::{Cutting, Stretch};
 use super::floquet::{MULTIPLICATIONS_PER_CHIP, Working, damped};
-use super::holding::{Closed, Holding, System};
+use super::holding::{Closed, Holding, System, eigenvalues};
 use super::settled::settled;
+use super::slow::is_slow;
 
 /// Points of an element; with elements of a fiftieth of the fastest oscillation their error is round-off.
 const POINTS: usize = 4;
@@ -21,6 +22,12 @@ const POINTS: usize = 4;
 const LEAST_ELEMENTS: f64 = 240.0;
 /// Elements per period of the fastest oscillation.
 const PER_OSCILLATION: f64 = 48.0;
+/// Factors of e by which what an entry or exit sets off has fallen before a slow cut goes on as its force does, to 1e-8.
+const SETTLED: f64 = 18.5;
+/// norm(A) h up to which an element is followed exactly.
+const FOLLOWED: f64 = 8.0;
+/// Change of the place at which the slope of a polynomial is taken, elements.
+const BESIDE: f64 = 1e-4;
 
 /// Largest and smallest value of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,6 +156,9 @@ pub(super) fn response<const N: usize>(
         Forces { chips_n, acting_n: chips_n }
     };
     let under_smooth = || Elements::new(&system, holding, cutting, working, smooth, monitor)?.response();
+    if is_slow(holding, cutting, working.spindle_rpm) {
+        return under_smooth();
+    }
     let why = match answering::<N>(&system, holding, cutting, working, Effort::Asked, monitor)? {
         Ok(motion) => {
             let response = if cutting.uneven() || holding.hardening_per_mm2 > 0.0 {
@@ -182,6 +192,9 @@ pub(super) fn unbroken<const N: usize>(
     working: Working,
     monitor: &dyn Monitor,
 ) -> Result<Option<Response>, Failure> {
+    if is_slow(holding, cutting, working.spindle_rpm) {
+        return unless_cancelled(response::<N>(holding, cutting, working, monitor));
+    }
     let system = holding.system::<N>(Closed::BOTH);
     let found = answering::<N>(&system, holding, cutting, working, Effort::Looked, monitor);
     let Some(motion) = unless_cancelled(found)?.and_then(Result::ok) else { return Ok(None) };
@@ -205,6 +218,9 @@ pub(super) fn span_mm<const N: usize>(
     working: Working,
     monitor: &dyn Monitor,
 ) -> Result<f64, Failure> {
+    if is_slow(holding, cutting, working.spindle_rpm) {
+        return Ok(response::<N>(holding, cutting, working, monitor)?.x_mm.span());
+    }
     match answering::<N>(&holding.system(Closed::BOTH), holding, cutting, working, Effort::Asked, monitor)? {
         Ok(motion) => Ok(motion.range_mm().span()),
         Err(_) => Ok(response::<N>(holding, cutting, working, monitor)?.x_mm.span()),
@@ -222,6 +238,41 @@ fn answering<'a, const N: usize>(
     answering_motion(system, cutting, working, holding.hardening_n_per_mm3(Closed::BOTH), effort, monitor)
 }
 
+/// The teeth excite a mode without damping exactly.
+fn undamped() -> Failure {
+    Failure::OutOfModel(Finding::new("undamped_resonance", "/cut/spindle_speed_rpm"))
+}
+
+/// The slowest decay of a free vibration, 1/s.
+fn slowest_decay<const N: usize>(a: &Matrix<N>) -> f64 {
+    eigenvalues(a).into_iter().map(|(re, _)| -re).fold(f64::INFINITY, f64::min).max(0.0)
+}
+
+/// A propagator that forgets how an element began: q = -A^-1 b F - A^-2 b F', what follows a force that hardly changes during an
+/// oscillation (`fixture/5.9`). `None` where nothing ties the masses.
+fn following<const N: usize>(
+    rule: &Rule<POINTS>,
+    a: &Matrix<N>,
+    b: &[f64; N],
+    h: f64,
+) -> Option<Propagator<N, POINTS>> {
+    let factors = DMatrix::from_fn(N, N, |i, j| a[i][j]).lu();
+    let by_force = factors.solve(&DVector::from_column_slice(b))?;
+    let by_slope = factors.solve(&by_force)?;
+    let (at, beyond, before) = (rule.weights_at(1.0), rule.weights_at(1.0 + BESIDE), rule.weights_at(1.0 - BESIDE));
+    let end_by_force = std::array::from_fn(|point| {
+        let slope = (beyond[point] - before[point]) / (2.0 * BESIDE * h);
+        std::array::from_fn(|k| -by_force[k] * at[point] - by_slope[k] * slope)
+    });
+    let none = [[0.0; N]; N];
+    Some(Propagator {
+        whole: none,
+        at_points: [[0.0; N]; POINTS],
+        points_by_force: [[0.0; POINTS]; POINTS],
+        end_by_force,
+    })
+}
+
 impl<'a, const N: usize> Elements<'a, N> {
     fn new(
         system: &'a System<N>,
@@ -237,36 +288,57 @@ impl<'a, const N: usize> Elements<'a, N> {
         let seconds_per_rad = tau / cutting.pitch_rad();
         let per_period = LEAST_ELEMENTS.max(PER_OSCILLATION * system.radius_rad_per_s * tau / std::f64::consts::TAU);
         let stretches = cutting.stretches();
+        let is_slow = is_slow(holding, cutting, working.spindle_rpm);
         let (mut propagators, mut matrices, mut pieces) = (Vec::new(), Vec::new(), Vec::new());
-        let counts: Vec<(f64, usize)> = stretches
-            .iter()
-            .map(|stretch| {
-                let a = damped(system, cutting, &working, stretch.teeth);
-                let count = (per_period * stretch.length_rad() / cutting.pitch_rad()).ceil().max(4.0);
-                let length = stretch.length_rad() / count;
-                propagators.push(Propagator::new(&rule, &a, &system.b, length * seconds_per_rad));
+        // Of every stretch: where elements of one length begin, their propagator, and how many there are.
+        let mut runs: Vec<Vec<(f64, usize, usize)>> = Vec::new();
+        for stretch in &stretches {
+            let a = damped(system, cutting, &working, stretch.teeth);
+            let whole = stretch.length_rad();
+            let transient = if is_slow { (SETTLED / slowest_decay(&a) / seconds_per_rad).min(whole) } else { whole };
+            let mut of_stretch = Vec::new();
+            // What damps so fast that no element follows it leaves no vibration behind either.
+            let is_followed = cutting.pitch_rad() / per_period * seconds_per_rad * norm(&a) <= FOLLOWED;
+            let followed = if is_slow && !is_followed { 0.0 } else { transient };
+            for (from, to, is_exact) in [(0.0, followed, true), (followed, whole, false)] {
+                if to - from <= 1e-12 * whole {
+                    continue;
+                }
+                let per = if is_exact { per_period } else { LEAST_ELEMENTS };
+                let elements = (per * (to - from) / cutting.pitch_rad()).ceil().max(4.0);
+                let length = (to - from) / elements;
+                let propagator = if is_exact {
+                    Propagator::new(&rule, &a, &system.b, length * seconds_per_rad)
+                } else {
+                    following(&rule, &a, &system.b, length * seconds_per_rad).ok_or_else(undamped)?
+                };
+                propagators.push(propagator);
                 matrices.push((a, length));
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, from 4 to some thousands
-                let count = count as usize;
-                (length, count)
-            })
-            .collect();
+                let count = elements as usize;
+                of_stretch.push((stretch.from_rad + from, propagators.len() - 1, count));
+            }
+            runs.push(of_stretch);
+        }
         for phase in 0..cutting.phases() {
-            for (kind, (stretch, &(length, count))) in stretches.iter().zip(&counts).enumerate() {
+            for (stretch, of_stretch) in stretches.iter().zip(&runs) {
                 let force = |since: f64| forces(stretch, since, phase);
                 let mut end = force(stretch.from_rad);
-                for i in 0..count {
-                    pace.work(MULTIPLICATIONS_PER_CHIP * (POINTS + 1) * (1 + stretch.teeth))?;
-                    let from_rad = stretch.from_rad + i as f64 * length;
-                    let start = end;
-                    end = force(from_rad + length);
-                    pieces.push(Piece {
-                        propagator: kind,
-                        stretch: *stretch,
-                        from_rad,
-                        acting_n: std::array::from_fn(|j| force(from_rad + rule.points[j] * length).acting_n),
-                        ends: (start, end),
-                    });
+                for &(begins_rad, kind, count) in of_stretch {
+                    let length = matrices[kind].1;
+                    for i in 0..count {
+                        pace.work(MULTIPLICATIONS_PER_CHIP * (POINTS + 1) * (1 + stretch.teeth))?;
+                        let from_rad = begins_rad + i as f64 * length;
+                        let start = end;
+                        end = force(from_rad + length);
+                        pieces.push(Piece {
+                            propagator: kind,
+                            stretch: *stretch,
+                            from_rad,
+                            acting_n: std::array::from_fn(|j| force(from_rad + rule.points[j] * length).acting_n),
+                            ends: (start, end),
+                        });
+                    }
                 }
             }
         }
@@ -287,8 +359,7 @@ impl<'a, const N: usize> Elements<'a, N> {
         }
         let right = DVector::from_column_slice(&forced);
         let solution = matrix.lu().solve(&right).filter(|s| s.iter().all(|value| value.is_finite()));
-        let start = solution
-            .ok_or_else(|| Failure::OutOfModel(Finding::new("undamped_resonance", "/cut/spindle_speed_rpm")))?;
+        let start = solution.ok_or_else(undamped)?;
         self.record(&std::array::from_fn(|i| start[i]))
     }
 

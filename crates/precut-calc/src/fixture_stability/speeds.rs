@@ -12,6 +12,7 @@ use super::march::Plan;
 use super::output::{BetterSpeed, FirstLimit, SpeedLimit};
 use super::simulate::{plan, run, scatter};
 use super::slip::Pushing;
+use super::slow::is_slow;
 
 /// Halvings of the depth at which a vise that is not linear reaches a limit: to a 16 000 000th of the depth.
 const HALVINGS: u32 = 24;
@@ -178,8 +179,7 @@ fn tried(study: &Study<'_>, spindle_speed_rpm: f64, most_mm: f64) -> Result<Opti
         return Ok(None);
     }
     let found = point(&study.rules, &case.holding, &case.cutting, working, Closed::BOTH, study.monitor)?;
-    let modulus = found.multiplier.modulus;
-    if modulus >= 1.0 {
+    if found.multiplier.grows() {
         return Ok(None);
     }
     match forced_span_mm(case, working, study.monitor) {
@@ -196,11 +196,14 @@ fn tried(study: &Study<'_>, spindle_speed_rpm: f64, most_mm: f64) -> Result<Opti
     }
     let SimulationSettings { regeneration, entry, .. } = study.job.simulation;
     let settings = SimulationSettings { regeneration, entry, ..SimulationSettings::default() };
-    let plan = Plan { unilateral: case.holding.clamp_force_n.is_some(), ..plan(case, &settings, working, modulus) };
-    let run = run(case, &plan, study.monitor)?;
-    let opened = run.first_open_left_s.or(run.first_open_right_s).is_some();
-    if run.diverged || opened || run.lost_cut > 0.0 || !scatter(case, &plan, &run).settled {
-        return Ok(None);
+    if !is_slow(&case.holding, &case.cutting, spindle_rpm) {
+        let modulus = found.multiplier.modulus;
+        let plan = Plan { unilateral: case.holding.clamp_force_n.is_some(), ..plan(case, &settings, working, modulus) };
+        let run = run(case, &plan, study.monitor)?;
+        let opened = run.first_open_left_s.or(run.first_open_right_s).is_some();
+        if run.diverged || opened || run.lost_cut > 0.0 || !scatter(case, &plan, &run).settled {
+            return Ok(None);
+        }
     }
     let drive = study.drive_depths(spindle_rpm);
     let first = first_of([

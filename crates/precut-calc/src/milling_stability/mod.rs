@@ -28,7 +28,8 @@ use crate::calculator::{
 };
 
 use answer::{Study, advice, outcome, picture};
-use job::{Case, N_MOST, range_rpm};
+use job::{Case, range_rpm};
+use model::MOST_OSCILLATIONS;
 
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +42,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 2,
+        version: 3,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction; edges may be helical, pitches, helices and run-out \
@@ -154,6 +155,10 @@ const REFINED: f64 = 1.8;
 /// Multipliers that the trials of pockets take.
 const TRIALS: f64 = 1500.0;
 
+/// A search for the limit of a slow cut, and its motion.
+const SLOW_MS: f64 = 60.0;
+const SLOW_MOTION_MS: f64 = 60.0;
+
 /// Clamping: loads of a period at one place of the cut, on a dozen contacts; of a dozen times as many where the law bends.
 const CLAMPING_MS: f64 = 15.0;
 /// Halvings of the depth at which a clamp force gives out.
@@ -169,12 +174,12 @@ fn elements(case: &Case, rotation: &model::Rotation) -> f64 {
     // With run-out every tooth may meet what any other left.
     let run_out = if milling.has_run_out() { 0.8 * teeth * teeth } else { 1.0 };
     let periods = if rotation.varies() { rotation.rotation_rad(rotation.period_s(turn)) / turn } else { 1.0 };
-    2.0 * case.oscillations_at(rotation).min(N_MOST) + periods * (breaks * run_out + turn / 0.8)
+    2.0 * case.oscillations_at(rotation).min(MOST_OSCILLATIONS) + periods * (breaks * run_out + turn / 0.8)
 }
 
 /// Of one multiplier.
 fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
-    let oscillations = case.oscillations_at(rotation).min(N_MOST);
+    let oscillations = case.oscillations_at(rotation).min(MOST_OSCILLATIONS);
     let directions = (0.5 * case.structure.basis.len() as f64).max(0.5).powf(1.5);
     let spaces = (1.0 + oscillations / SPACES_GROW) * (oscillations / RESTARTED).max(1.0).powf(1.3);
     // An edge whose law bends is summed on points, tooth by tooth.
@@ -187,16 +192,20 @@ fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
 /// Expected work.
 fn cost(job: &Job) -> Cost {
     let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
-    let here = point_ms(&case, &case.rotation);
+    let is_slow = case.cut().is_slow();
+    // In place of a multiplier and of a search for the limit stands one search.
+    let here = if is_slow { SLOW_MS / PER_SEARCH } else { point_ms(&case, &case.rotation) };
     let directions = case.structure.basis.len() as f64;
     let mut parts = vec![(ANY_MS, "/cut/spindle_speed_rpm")];
     let mut bytes = 500_000.0 + 4e4 * elements(&case, &case.rotation) * directions;
     if job.asks(Asked::Verdict) {
-        parts.push((4.0 * here, "/cut/spindle_speed_rpm"));
+        let searches = if is_slow { PER_SEARCH } else { 4.0 };
+        parts.push((searches * here, "/cut/spindle_speed_rpm"));
     }
     if job.asks(Asked::Motion) {
         let repeats = case.milling.teeth_are_alike() && !case.rotation.varies();
-        parts.push((if repeats { 0.5 } else { 2.0 } * here, "/cut/spindle_speed_rpm"));
+        let solved = if repeats { 0.5 } else { 2.0 } * here;
+        parts.push((if is_slow { SLOW_MOTION_MS } else { solved }, "/cut/spindle_speed_rpm"));
     }
     let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
     let clamping_ms = clamping.map_or(0.0, |of| (1.0 + of.stations.len() as f64) * CLAMPING_MS + 0.5 * here);
@@ -217,7 +226,7 @@ fn cost(job: &Job) -> Cost {
         let (from, to) = range_rpm(job, case.rotation.spindle_rpm);
         // Slow speeds take longest; those that are not answered cost nothing.
         let at = |speed: f64| {
-            let rotation = case.at_speed(speed).filter(|rotation| case.oscillations_at(rotation) <= N_MOST);
+            let rotation = case.at_speed(speed).filter(|rotation| case.oscillations_at(rotation) <= MOST_OSCILLATIONS);
             rotation.map_or(0.0, |rotation| ON_MAP * point_ms(&case, &rotation))
         };
         let mean = (0..9).map(|k| at(from + (to - from) * f64::from(k) / 8.0)).sum::<f64>() / 9.0;
@@ -249,10 +258,14 @@ fn basis(job: &Job) -> Vec<Basis> {
         Basis { equation: "milling/3.10", source: "modal superposition of both sides" },
         Basis { equation: "milling/4.16", source: "Altintas, Budak 1995" },
     ];
-    if job.asks_stability() {
+    let is_slow = Case::of(job).is_some_and(|case| case.cut().is_slow());
+    if is_slow {
+        used.push(Basis { equation: "milling/4.21", source: "Altintas, Budak 1995, at every place of the arc" });
+    }
+    if job.asks_stability() && (!is_slow || job.asks(Asked::Lobes) || job.asks(Asked::Speeds)) {
         used.push(Basis { equation: "milling/4.15", source: "Floquet theory on spectral elements" });
     }
-    if job.asks(Asked::Verdict) {
+    if job.asks(Asked::Verdict) && !is_slow {
         used.push(Basis { equation: "milling/4.19", source: "Fourier series of the leading disturbance" });
     }
     if job.asks(Asked::Intervals) || job.asks(Asked::Lobes) {

@@ -9,8 +9,8 @@ use super::super::job::{Asked, EdgeForce, Job, modes, way};
 use super::super::model::Law;
 use super::clamping::is_enough;
 use super::output::{
-    ClampCriterion, ClampRemedyKind, CutterProposal, ForceOfSide, InstabilityKind, MillingClamping, MillingState,
-    Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
+    ClampCriterion, ClampRemedyKind, CutterProposal, ForceOfSide, InstabilityKind, LeadingMultiplier, MillingClamping,
+    MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
 };
 use super::proposals::effort;
 use super::{Aside, MODEL_ENDS, Study};
@@ -55,6 +55,7 @@ pub(in crate::milling_stability) const WARNING_CODES: &[&str] = &[
 pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "milling_stable",
     "milling_settles_slowly",
+    "milling_slow_cut",
     "milling_chatters",
     "milling_undecided",
     "milling_overloaded",
@@ -124,6 +125,7 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
     }
     if let (Some(zeroth), Some(limit)) = (outcome.zeroth_order_min_mm, outcome.first_limit_mm)
         && zeroth > (1.0 + ABOVE) * limit
+        && !study.is_slow
     {
         found.push(Finding::new("zeroth_order_above", "/cut").measured(zeroth, limit, "mm"));
     }
@@ -262,7 +264,7 @@ fn implausible(job: &Job) -> Vec<Finding> {
 }
 
 pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Message> {
-    let mut said: Vec<Message> = of_verdict(study, outcome).into_iter().collect();
+    let mut said: Vec<Message> = of_verdict(study, outcome, aside).into_iter().collect();
     if outcome.islands_checked_to_mm.is_some() {
         said.push(match outcome.first_limit_mm {
             Some(limit) if limit > 0.0 => Message::new("chatter_limit_is")
@@ -309,9 +311,9 @@ pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Out
     said
 }
 
-fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
-    let (Some(verdict), Some(multiplier)) = (&outcome.verdict, &outcome.multiplier) else { return Vec::new() };
-    let mut said = vec![match verdict.state {
+/// What becomes of a disturbance.
+fn of_multiplier(state: MillingState, multiplier: &LeadingMultiplier) -> Message {
+    match state {
         MillingState::Stable => Message::new("milling_stable").with("per_tooth", multiplier.per_tooth),
         MillingState::Chatter => {
             let message = Message::new("milling_chatters")
@@ -322,7 +324,25 @@ fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
                 None => message,
             }
         }
-        MillingState::Undecided => Message::new("milling_undecided").with("modulus", multiplier.modulus),
+        _ => Message::new("milling_undecided").with("modulus", multiplier.modulus),
+    }
+}
+
+/// The same of a slow cut.
+fn of_slow(outcome: &Outcome, aside: &Aside) -> Message {
+    let message = Message::new("milling_slow_cut").with("oscillations", outcome.cost.oscillations_per_period);
+    match outcome.first_limit_mm.zip(aside.slow_hz) {
+        Some((depth_mm, hz)) => message.with("depth_mm", depth_mm).with("frequency_hz", hz),
+        None => message.with("examined_mm", outcome.examined_to_mm),
+    }
+}
+
+fn of_verdict(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Message> {
+    let Some(verdict) = &outcome.verdict else { return Vec::new() };
+    let of_growth =
+        outcome.multiplier.as_ref().map_or_else(|| of_slow(outcome, aside), |of| of_multiplier(verdict.state, of));
+    let mut said = vec![match verdict.state {
+        MillingState::Stable | MillingState::Chatter | MillingState::Undecided => of_growth,
         MillingState::Overloaded => {
             Message::new("milling_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0))
         }
@@ -333,7 +353,13 @@ fn of_verdict(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
         MillingState::Lifts => Message::new("milling_comes_off")
             .with("off_n", outcome.clamping.as_ref().and_then(|clamping| clamping.comes_off_n).unwrap_or(0.0)),
     }];
-    if let Some(time_s) = multiplier.settling_time_s.filter(|time| *time > SLOW_S) {
+    let is_told = matches!(verdict.state, MillingState::Stable | MillingState::Chatter);
+    if study.is_slow && !is_told {
+        said.push(of_slow(outcome, aside));
+    }
+    if let Some(multiplier) = &outcome.multiplier
+        && let Some(time_s) = multiplier.settling_time_s.filter(|time| *time > SLOW_S)
+    {
         said.push(
             Message::new("milling_settles_slowly")
                 .with("time_s", time_s)

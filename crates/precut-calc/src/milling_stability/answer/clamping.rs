@@ -3,8 +3,8 @@
 use crate::calculator::{Failure, checkpoint};
 use crate::clamping::{Asked as AskedOfSheet, Contact, Criterion, Load, Rest, Sheet, Unheld, Vector};
 
-use super::super::job::{Held, N_MOST, way};
-use super::super::model::{Carried, Cut, Forced, Instant, Sampling, Side, statics};
+use super::super::job::{Held, way};
+use super::super::model::{Carried, Cut, Forced, Instant, MOST_OSCILLATIONS, Sampling, Side, statics};
 use super::output::{
     ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampTurn, ClampingStatus, ContactUse,
     MillingClamping,
@@ -36,7 +36,8 @@ fn yields(cut: &Cut<'_>) -> bool {
 
 /// A forced motion that the model knows; `None` of one that has none, or beyond the model, or over too many oscillations.
 fn known<'a>(study: &'a Study<'_>, cut: &'a Cut<'a>) -> Result<Option<Forced<'a>>, Failure> {
-    if !yields(cut) || cut.rotation.varies() || study.case.oscillations_at(&cut.rotation) > N_MOST {
+    let is_dear = cut.oscillations() > MOST_OSCILLATIONS && !cut.is_slow();
+    if !yields(cut) || cut.rotation.varies() || is_dear {
         return Ok(None);
     }
     let forced = study.orders.forced(cut, study.monitor)?;

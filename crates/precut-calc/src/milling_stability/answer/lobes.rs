@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use crate::calculator::{Failure, Message, checkpoint};
 
-use super::super::job::{N_MOST, range_rpm};
+use super::super::job::range_rpm;
+use super::super::model::MOST_OSCILLATIONS;
 use super::super::model::{Cut, Rotation, Scan, Search, scan};
 use super::output::{LobeIntervals, MillingBoundary, MillingLobes, MillingMap, SpeedStatus};
 use super::{Study, intervals, scan_of};
@@ -36,7 +37,7 @@ impl Row {
 /// The spindle at a speed, unless it is not answered.
 pub(super) fn rotation_at(study: &Study<'_>, spindle_rpm: f64) -> Result<Rotation, SpeedStatus> {
     let rotation = study.case.at_speed(spindle_rpm).ok_or(SpeedStatus::Incommensurate)?;
-    if study.case.oscillations_at(&rotation) > N_MOST { Err(SpeedStatus::TooSlow) } else { Ok(rotation) }
+    if study.case.oscillations_at(&rotation) > MOST_OSCILLATIONS { Err(SpeedStatus::TooSlow) } else { Ok(rotation) }
 }
 
 /// One speed, to the accuracy of maps.

@@ -16,8 +16,8 @@ use crate::fixture_stability::power_kw;
 
 use super::job::{Asked, Case, Held, Job, RubbingSource};
 use super::model::{
-    self, Cut, Law, Milling, Multiplier, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan, statics,
-    unstable, zeroth,
+    self, Cut, Law, Milling, Multiplier, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan, slow_limit,
+    statics, unstable, zeroth,
 };
 use output::{
     ClampingStatus, DepthLine, ForceOfSide, FrequencyShare, LeadingMultiplier, MillingClamping, MillingCost,
@@ -50,6 +50,8 @@ pub(super) struct Study<'a> {
     pub case: Case,
     pub orders: Orders,
     pub zeroth: Option<Zeroth>,
+    /// Hundreds of oscillations from tooth to tooth: closed forms in place of multipliers.
+    pub is_slow: bool,
     pub examined_mm: f64,
     /// Mean torque of 1 mm of depth.
     torque_at_1_mm_n_m: f64,
@@ -63,6 +65,8 @@ pub(super) struct Study<'a> {
 pub(super) struct Aside {
     /// Swing of a motion that is beyond the model, mm.
     pub beyond_mm: Option<f64>,
+    /// Frequency at which a slow cut begins to chatter, where it does up to what was examined.
+    pub slow_hz: Option<f64>,
     /// No periodic motion was found.
     pub no_motion: bool,
     /// Along or about which axis nothing holds the workpiece against the cut.
@@ -76,16 +80,40 @@ impl<'a> Study<'a> {
         let torque_at_1_mm_n_m = statics(&case.milling, 1.0, monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
         let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
         let held = clamping.and_then(|clamping| clamping.held()?.ok());
-        Ok(Self { job, case, orders: Orders::default(), zeroth, examined_mm, torque_at_1_mm_n_m, held, monitor })
+        let is_slow = case.cut().is_slow();
+        Ok(Self {
+            job,
+            case,
+            orders: Orders::default(),
+            zeroth,
+            is_slow,
+            examined_mm,
+            torque_at_1_mm_n_m,
+            held,
+            monitor,
+        })
     }
 
     pub(super) fn cut(&self) -> Cut<'_> {
-        self.of(&self.case.milling, &self.case.structure)
+        self.case.cut()
     }
 
     /// The same cut with another cutter or structure.
     pub(super) fn of<'b>(&self, milling: &'b Milling, structure: &'b Structure) -> Cut<'b> {
         Cut { milling, structure, rotation: self.case.rotation, depth_mm: self.case.depth_mm }
+    }
+
+    /// Depth at which a cut first becomes unstable.
+    fn first_limit_mm(&self, cut: &Cut<'_>) -> Result<Option<f64>, Failure> {
+        if self.is_slow {
+            return Ok(self.slow_limit(cut)?.map(|limit| limit.depth_mm));
+        }
+        Ok(scan_of(self, cut, true)?.first_mm())
+    }
+
+    /// That of a slow cut, with its frequency.
+    fn slow_limit(&self, cut: &Cut<'_>) -> Result<Option<Zeroth>, Failure> {
+        slow_limit(cut.milling, cut.structure, self.examined_mm, self.monitor)
     }
 
     /// The exponent by which 1 over the modulus of a period becomes that of a tooth.
@@ -123,11 +151,15 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let mut aside = Aside::default();
     monitor.progress(0.02, Message::new("stage_multiplier"));
     let force = forces(study)?;
-    let multiplier = if job.asks(Asked::Verdict) { Some(multiplier(study)?) } else { None };
+    let multiplier = if job.asks(Asked::Verdict) && !study.is_slow { Some(multiplier(study)?) } else { None };
     monitor.progress(0.1, Message::new("stage_intervals"));
-    let seen = if job.asks(Asked::Intervals) { Some(scan_of(study, &study.cut(), false)?) } else { None };
-    let limited_by = if seen.is_some() { rigid::limits(study)? } else { None };
-    let other_assumptions = if seen.is_some() { other_assumptions(study)? } else { OtherAssumptions::default() };
+    let intervals_asked = job.asks(Asked::Intervals);
+    let seen = if intervals_asked && !study.is_slow { Some(scan_of(study, &study.cut(), false)?) } else { None };
+    let limit_asked = study.is_slow && (intervals_asked || job.asks(Asked::Verdict));
+    let slow = if limit_asked { study.slow_limit(&study.cut())? } else { None };
+    aside.slow_hz = slow.map(|limit| limit.frequency_hz);
+    let limited_by = if intervals_asked { rigid::limits(study)? } else { None };
+    let other_assumptions = if intervals_asked { other_assumptions(study)? } else { OtherAssumptions::default() };
     monitor.progress(0.4, Message::new("stage_motion"));
     let motion = if job.asks(Asked::Motion) { motion(study, &mut aside)? } else { None };
     monitor.progress(0.45, Message::new("stage_clamping"));
@@ -138,9 +170,14 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     });
     let rows = if job.asks(Asked::Lobes) || job.asks(Asked::Speeds) { lobes::rows(study)? } else { Vec::new() };
     let lobes = if job.asks(Asked::Lobes) { Some(lobes::lobes(study, &rows)?) } else { None };
-    let first_limit_mm = seen.as_ref().and_then(Scan::first_mm);
-    let verdict = multiplier.as_ref().map(|(found, ..)| MillingVerdict {
-        state: state(study, found, &force, motion.as_ref(), clamping.as_ref()),
+    let first_limit_mm = seen.as_ref().and_then(Scan::first_mm).or(slow.map(|limit| limit.depth_mm));
+    let grows = match &multiplier {
+        Some((found, _)) if (found.modulus - 1.0).abs() <= found.modulus_error => None,
+        Some((found, _)) => Some(found.modulus > 1.0),
+        None => Some(first_limit_mm.is_some_and(|limit| case.depth_mm >= limit)),
+    };
+    let verdict = job.asks(Asked::Verdict).then(|| MillingVerdict {
+        state: state(study, grows, &force, motion.as_ref(), clamping.as_ref()),
         depth_margin: first_limit_mm.filter(|_| case.depth_mm > 0.0).map(|limit| limit / case.depth_mm),
         drive_margin: drive_margin(&force),
     });
@@ -152,7 +189,10 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
         multiplier: multiplier.map(|(found, _)| found),
         modes: modes(case, energy.as_deref()),
         first_limit_mm,
-        unstable_intervals: seen.as_ref().map(intervals).unwrap_or_default(),
+        unstable_intervals: match slow.filter(|_| intervals_asked) {
+            Some(limit) => vec![UnstableInterval::from(limit.depth_mm)],
+            None => seen.as_ref().map(intervals).unwrap_or_default(),
+        },
         examined_to_mm: study.examined_mm,
         islands_checked_to_mm: seen.as_ref().map(|_| study.examined_mm),
         depth_line: seen.as_ref().map(|seen| depth_line(study, seen)),
@@ -193,7 +233,7 @@ fn floor_acts(milling: &Milling) -> bool {
 fn other_assumptions(study: &Study<'_>) -> Result<OtherAssumptions, Failure> {
     let milling = &study.case.milling;
     let limit = |milling: &Milling| -> Result<Option<f64>, Failure> {
-        Ok(scan_of(study, &study.of(milling, &study.case.structure), true)?.first_mm())
+        study.first_limit_mm(&study.of(milling, &study.case.structure))
     };
     let mut found = OtherAssumptions::default();
     if floor_acts(milling)
@@ -218,16 +258,15 @@ fn other_assumptions(study: &Study<'_>) -> Result<OtherAssumptions, Failure> {
 
 fn state(
     study: &Study<'_>,
-    multiplier: &LeadingMultiplier,
+    grows: Option<bool>,
     force: &MillingForces,
     motion: Option<&MillingMotion>,
     clamping: Option<&MillingClamping>,
 ) -> MillingState {
-    if (multiplier.modulus - 1.0).abs() <= multiplier.modulus_error {
-        return MillingState::Undecided;
-    }
-    if multiplier.modulus > 1.0 {
-        return MillingState::Chatter;
+    match grows {
+        None => return MillingState::Undecided,
+        Some(true) => return MillingState::Chatter,
+        Some(false) => {}
     }
     if let Some(state) = clamping.and_then(loose) {
         return state;
@@ -374,6 +413,22 @@ fn intervals(seen: &Scan) -> Vec<UnstableInterval> {
         }
     };
     stretches.iter().map(of).collect()
+}
+
+impl From<f64> for UnstableInterval {
+    /// Of a slow cut: from its limit on.
+    fn from(limit_mm: f64) -> Self {
+        Self {
+            from_mm: Some(limit_mm),
+            to_mm: None,
+            kind: model::Kind::Hopf.into(),
+            from_low_mm: None,
+            from_high_mm: None,
+            to_low_mm: None,
+            to_high_mm: None,
+            certified: true,
+        }
+    }
 }
 
 fn depth_line(study: &Study<'_>, seen: &Scan) -> DepthLine {

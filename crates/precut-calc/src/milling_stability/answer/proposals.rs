@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use crate::calculator::{Failure, Message};
 
-use super::super::job::{Case, N_MOST, varying};
+use super::super::job::{Case, varying};
+use super::super::model::MOST_OSCILLATIONS;
 use super::super::model::{Cut, Milling, Rotation, Search, scan};
 use super::output::{CutterProposal, ProposalKind};
 use super::{MM3_PER_CM3, Study};
@@ -144,7 +145,7 @@ fn is_answered(case: &Case, milling: &Milling, rotation: &Rotation) -> bool {
     // A modulation that fits into a tooth pitch need not fit into a turn.
     let fits =
         !rotation.varies() || varying(milling, rotation.spindle_rpm, rotation.amplitude, rotation.frequency_hz).is_ok();
-    fits && case.structure.fastest_rad_per_s() / TAU * rotation.period_s(milling.period_rad()) <= N_MOST
+    fits && case.structure.fastest_rad_per_s() / TAU * rotation.period_s(milling.period_rad()) <= MOST_OSCILLATIONS
 }
 
 fn helices(study: &Study<'_>) -> Vec<Trial> {

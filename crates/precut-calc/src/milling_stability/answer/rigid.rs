@@ -3,8 +3,8 @@
 use crate::calculator::Failure;
 
 use super::super::model::{Mode, Side, Structure};
+use super::Study;
 use super::output::RigidLimits;
-use super::{Study, scan_of};
 
 /// A mode whose direction has less than this left is gone.
 const GONE: f64 = 1e-6;
@@ -36,7 +36,7 @@ pub(super) fn limits(study: &Study<'_>) -> Result<Option<RigidLimits>, Failure> 
             continue;
         }
         let structure = Structure::new(left);
-        let limit = scan_of(study, &study.of(&study.case.milling, &structure), true)?.first_mm();
+        let limit = study.first_limit_mm(&study.of(&study.case.milling, &structure))?;
         found.tried.push(name.to_owned());
         *match name {
             "tool" => &mut found.tool_rigid_limit_mm,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::fixture_stability::{Vise, engagement_rad};
 
-use super::super::model::{Law, Milling, Mode, Rotation, Rubbing, Side, Structure, Tooth, Vector};
+use super::super::model::{Cut as ModelCut, Law, Milling, Mode, Rotation, Rubbing, Side, Structure, Tooth, Vector};
 use super::input::{
     Cut, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, Milling as Sense, Yielding, YieldingMode,
 };
@@ -13,8 +13,6 @@ use super::input::{
 pub(in crate::milling_stability) const MODULATIONS: u32 = 8;
 /// A modulation is moved by so much at most to fit into a period.
 const MOVED: f64 = 0.005;
-/// Oscillations of the fastest mode in a period of the map up to which the multiplier is computed.
-pub(in crate::milling_stability) const N_MOST: f64 = 2000.0;
 /// m x'' in kg mm/s2 over the force in N.
 const MM_PER_S2: f64 = 1000.0;
 
@@ -50,6 +48,12 @@ impl Case {
         Some(Self { milling, structure: Structure::new(modes), rotation, depth_mm: job.cut.depth_mm, width_mm })
     }
 
+    /// The cut of the job.
+    pub(in crate::milling_stability) fn cut(&self) -> ModelCut<'_> {
+        let Self { milling, structure, rotation, depth_mm, .. } = self;
+        ModelCut { milling, structure, rotation: *rotation, depth_mm: *depth_mm }
+    }
+
     /// Oscillations of the fastest mode in a period of the map.
     pub(in crate::milling_stability) fn oscillations(&self) -> f64 {
         self.oscillations_at(&self.rotation)
@@ -57,7 +61,7 @@ impl Case {
 
     /// The same of another rotation.
     pub(in crate::milling_stability) fn oscillations_at(&self, rotation: &Rotation) -> f64 {
-        self.structure.fastest_rad_per_s() / TAU * rotation.period_s(self.milling.period_rad())
+        ModelCut { rotation: *rotation, ..self.cut() }.oscillations()
     }
 
     /// The spindle at another speed; `None` where its modulation fits into no period there.

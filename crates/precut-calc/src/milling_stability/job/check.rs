@@ -6,8 +6,9 @@ use crate::calculator::{Check, Finding, Violations};
 use crate::clamping::Unheld;
 use crate::fixture_stability::{Vise, check_characteristic, check_friction};
 
+use super::super::model::MOST_OSCILLATIONS;
 use super::super::model::Rotation;
-use super::case::{Case, N_MOST, arc_rad, coefficient, direction, milling, numbers, range_rpm, varying};
+use super::case::{Case, arc_rad, coefficient, direction, milling, numbers, range_rpm, varying};
 use super::input::{Asked, EdgeForce, Job, Yielding, YieldingMode};
 
 /// Codes of the faults found here, and those that fields name for their range.
@@ -273,18 +274,20 @@ fn check_spindle(job: &Job, violations: &mut Violations) {
     }
 }
 
-/// A multiplier over thousands of oscillations is refused; a lobe diagram leaves such speeds out.
+/// A multiplier over thousands of oscillations is refused; a lobe diagram leaves such speeds out. Of a slow cut closed forms tell what
+/// is asked, but no other cutter is tried.
 fn check_cost(job: &Job, violations: &mut Violations) {
     let at_speed =
         [Asked::Verdict, Asked::Intervals, Asked::Motion, Asked::Proposals].into_iter().any(|what| job.asks(what));
     let Some(case) = Case::of(job).filter(|_| at_speed) else { return };
     let oscillations = case.oscillations();
-    violations.require(oscillations <= N_MOST, || {
+    let is_told = case.cut().is_slow() && !job.asks(Asked::Proposals);
+    violations.require(is_told || oscillations <= MOST_OSCILLATIONS, || {
         // Of a varying speed a period is some modulations, whatever the speed.
         let steady = Rotation::steady(case.rotation.spindle_rpm);
-        let lowest = steady.spindle_rpm * case.oscillations_at(&steady) / N_MOST;
+        let lowest = steady.spindle_rpm * case.oscillations_at(&steady) / MOST_OSCILLATIONS;
         Finding::new("too_expensive", "/cut/spindle_speed_rpm")
-            .measured(oscillations, N_MOST, "1")
+            .measured(oscillations, MOST_OSCILLATIONS, "1")
             .with("speed_rpm", case.rotation.spindle_rpm)
             .with("lowest_rpm", lowest)
             .with("varies", if case.rotation.varies() { "yes" } else { "no" })

@@ -5,7 +5,7 @@ mod check;
 mod held;
 mod input;
 
-pub(super) use case::{Case, N_MOST, range_rpm, varying};
+pub(super) use case::{Case, range_rpm, varying};
 pub(super) use check::{CODES, modes, way};
 pub(super) use held::Held;
 pub use held::{Coordinate, CutStation, GrippingContacts, GrippingPoint, GrippingVise, PartClamping};

@@ -90,6 +90,19 @@ pub(super) fn forced<'a>(
     Ok(Some(Forced { cut, rule, times: map.times, motion, pressed }))
 }
 
+impl<'a> Forced<'a> {
+    /// Of what is known at the points of elements, in the basis.
+    pub(super) fn of(
+        cut: &'a Cut<'a>,
+        rule: &'a Rule<POINTS>,
+        times: Vec<f64>,
+        motion: Vec<Vec<f64>>,
+        pressed: Vec<Vec<f64>>,
+    ) -> Self {
+        Self { cut, rule, times, motion, pressed }
+    }
+}
+
 impl Forced<'_> {
     fn period_s(&self) -> f64 {
         self.times[self.times.len() - 1]

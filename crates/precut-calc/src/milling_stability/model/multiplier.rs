@@ -6,6 +6,7 @@ use crate::num::dde::{Rule, largest_paced, largest_pair_paced};
 use super::forced::{Forced, forced};
 use super::map::{Cut, Map};
 use super::shares::{Shares, shares};
+use super::slow::slow_forced;
 
 /// Points of an element, of the finer one that tells the error, and of one that does for a map.
 pub(super) const POINTS: usize = 12;
@@ -106,6 +107,9 @@ impl Orders {
 
     /// The motion that repeats itself from period to period (`milling/4.20`); `None` where there is none.
     pub fn forced<'a>(&'a self, cut: &'a Cut<'a>, monitor: &dyn Monitor) -> Result<Option<Forced<'a>>, Failure> {
+        if cut.is_slow() {
+            return Ok(Some(slow_forced(cut, &self.usual, monitor)?));
+        }
         forced(cut, &self.usual, monitor)
     }
 

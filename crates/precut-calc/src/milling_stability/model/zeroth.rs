@@ -54,25 +54,33 @@ pub fn mean_stiffness(milling: &Milling) -> Tensor {
 /// The least depth over all speeds; `None` where the mean drives nothing.
 pub fn zeroth(milling: &Milling, structure: &Structure) -> Option<Zeroth> {
     let mean = mean_stiffness(milling);
+    let (linear, frequency_hz) = least(structure, &projected(structure, &mean), FREQUENCIES)?;
+    Some(Zeroth { depth_mm: linear.powf(1.0 / (1.0 - milling.depth_exponent)), frequency_hz })
+}
+
+/// A stiffness in the directions in which anything yields.
+pub(super) fn projected(structure: &Structure, stiffness: &Tensor) -> DMatrix<f64> {
     let d = structure.basis.len();
-    let w = DMatrix::from_fn(d, d, |a, b| {
+    DMatrix::from_fn(d, d, |a, b| {
         let (left, right) = (structure.basis[a], structure.basis[b]);
-        (0..3).flat_map(|i| (0..3).map(move |j| left[i] * mean[i][j] * right[j])).sum::<f64>()
-    });
+        (0..3).flat_map(|i| (0..3).map(move |j| left[i] * stiffness[i][j] * right[j])).sum::<f64>()
+    })
+}
+
+/// How many times a steady stiffness until a disturbance grows at some speed, and at which frequency, Hz.
+pub(super) fn least(structure: &Structure, w: &DMatrix<f64>, frequencies: u32) -> Option<(f64, f64)> {
     let low = structure.modes.iter().map(|m| m.frequency_hz).fold(f64::INFINITY, f64::min) * 0.3;
     let high = structure.modes.iter().map(|m| m.frequency_hz).fold(0.0, f64::max) * 3.0;
-    let at = |step: f64| low * (high / low).powf(step / f64::from(FREQUENCIES));
-    let depth = |hz: f64| largest_real_part(structure, &w, TAU * hz).map(|re| 0.5 / re);
+    let at = |step: f64| low * (high / low).powf(step / f64::from(frequencies));
+    let depth = |hz: f64| largest_real_part(structure, w, TAU * hz).map(|re| 0.5 / re);
     let of = |step: f64| depth(at(step)).unwrap_or(f64::INFINITY);
-    let best = (0..=FREQUENCIES).map(f64::from).min_by(|a, b| of(*a).total_cmp(&of(*b)))?;
+    let best = (0..=frequencies).map(f64::from).min_by(|a, b| of(*a).total_cmp(&of(*b)))?;
     let (mut a, mut b) = (best - 1.0, best + 1.0);
     for _ in 0..60 {
         let (p, q) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
         if of(p) < of(q) { b = q } else { a = p }
     }
-    let linear = depth(at(0.5 * (a + b)))?;
-    let depth_mm = linear.powf(1.0 / (1.0 - milling.depth_exponent));
-    Some(Zeroth { depth_mm, frequency_hz: at(0.5 * (a + b)) })
+    Some((depth(at(0.5 * (a + b)))?, at(0.5 * (a + b))))
 }
 
 /// The largest positive real part of an eigenvalue of G W.
