@@ -14,8 +14,9 @@ use crate::milling_answers::trials;
 
 /// Moduli so near to 1 take more teeth to decide than are followed.
 const UNDECIDED: f64 = 0.03;
-/// Steps of an oscillation.
+/// Steps of an oscillation, and of a tooth at least: the arc is cut off at whole steps.
 const STEPS: f64 = 600.0;
+const STEPS_OF_TOOTH: f64 = 2400.0;
 
 fn number(job: &Value, pointer: &str) -> f64 {
     job.pointer(pointer).and_then(Value::as_f64).unwrap_or(0.0)
@@ -88,7 +89,7 @@ fn followed(job: &Value, clamp_force_n: Option<f64>, periods: usize) -> Followed
     let [mass, jaw] = ["/fixture/workpiece_mass_kg", "/fixture/jaw_mass_kg"].map(|at| number(job, at) / 1e3);
     let fastest = ((c1 + c2) / mass).max(if jaw > 0.0 { (c1 / jaw) + c1 / mass } else { 0.0 }).sqrt();
     let period = 60.0 / (rpm * teeth);
-    let steps = (STEPS * fastest * period / TAU).ceil().max(STEPS) as usize;
+    let steps = (STEPS * fastest * period / TAU).ceil().max(STEPS_OF_TOOTH) as usize;
     let dt = period / steps as f64;
     let (entry, exit) =
         (((2.0 * offset + width) / diameter).min(1.0).acos(), ((2.0 * offset - width) / diameter).max(-1.0).acos());
@@ -156,7 +157,7 @@ fn followed(job: &Value, clamp_force_n: Option<f64>, periods: usize) -> Followed
 
 /// Teeth after which a disturbance has decayed or grown by e^12.
 fn teeth(got: &FixtureOutcome) -> usize {
-    ((12.0 / got.multiplier.modulus.ln().abs()).ceil() as usize).clamp(60, 500)
+    ((12.0 / got.multiplier.modulus.ln().abs()).ceil() as usize).clamp(60, 4000)
 }
 
 /// Stable cuts settle in time, chattering ones do not; a clamp force one percent above what is told holds both joints, and the steady
@@ -189,11 +190,11 @@ fn verdicts_and_clamp_forces_are_those_of_the_cut_in_time() {
     println!("{judged} verdicts and {clamped} clamp forces followed in time");
 }
 
-/// A better speed, set as it is read: the cut is stable there, nearly always a tenth short of chatter, moves by no more than it is fed, removes
+/// A better speed, set as it is read: the cut is stable there and a tenth short of chatter, moves by no more than it is fed, removes
 /// what is told, and settles in time.
 #[test]
 fn better_speeds_hold_where_they_are_set() {
-    let (mut tried, mut short) = (0, 0);
+    let mut tried = 0;
     for seed in 0..trials(3) as u64 {
         let mut job = drawn(1000 + seed);
         job["analyses"] = json!(["lobes"]);
@@ -205,19 +206,22 @@ fn better_speeds_hold_where_they_are_set() {
             there["analyses"] = json!(["verdict"]);
             let got = outcome(&there);
             assert_eq!(got.verdict.state, FixtureState::Stable, "{seed}: {better:?}: {there}");
-            // An island thinner than a step of the scan may lie within the tenth that is kept from chatter, not below it.
             let limit = got.chatter_depth_mm.unwrap_or(f64::INFINITY);
-            assert!(better.depth_mm < limit, "{seed}: {better:?} {limit}");
-            short += u32::from(better.depth_mm <= 0.9 * limit * (1.0 + 1e-6));
+            assert!(better.depth_mm <= 0.9 * limit * (1.0 + 1e-6), "{seed}: {better:?} {limit}: {there}");
             assert!(got.verdict.peak_to_peak_over_feed <= 1.0, "{seed}: {:?}", got.verdict);
             let removed = got.engagement.removal_rate_cm3_per_min;
             assert!((removed / better.removal_rate_cm3_per_min - 1.0).abs() < 1e-9, "{seed}: {removed} {better:?}");
             let run = followed(&there, None, teeth(&got));
             assert!(run.scatter < 0.02, "{seed}: {} {better:?}: {there}", run.scatter);
-            assert!(run.asked_n.max(0.0) < 1.01 * better.clamp_force_n + 1.0, "{seed}: {} {better:?}", run.asked_n);
+            // What has not settled yet moves by the scatter, and the joints with it.
+            let stiffest =
+                ["movable", "fixed"].map(|at| number(&job, &format!("/fixture/{at}_joint/stiffness_n_per_mm")));
+            let unsettled_n = run.scatter * number(&job, "/cut/feed_mm_per_tooth") * stiffest[0].max(stiffest[1]);
+            let most_n = 1.01 * better.clamp_force_n + 1.0 + unsettled_n;
+            assert!(run.asked_n < most_n, "{seed}: {} {most_n} {}: {better:?}: {there}", run.asked_n, run.scatter);
             tried += 1;
         }
     }
-    println!("{tried} better speeds tried, {short} a tenth short of chatter");
-    assert!(f64::from(short) >= 0.95 * f64::from(tried), "{short} of {tried}");
+    println!("{tried} better speeds tried");
+    assert!(tried > 0);
 }

@@ -23,6 +23,11 @@ const COARSE_RESIDUAL: f64 = 1e-5;
 const FINE_RESIDUAL: f64 = 1e-9;
 /// Steps of the upward scan of a column.
 const SCAN: u32 = 24;
+/// ln |mu| below which a cut is stable: without any damping it is 0 to round-off.
+const STABLE: f64 = 1e-9;
+/// Steps to the top of a peak between depths of the scan, each this share of the larger side: to 2 % of it.
+const PEAK: u32 = 8;
+const GOLDEN: f64 = 0.381_966_011_250_105;
 /// Relative accuracy of a limiting depth on a map and of one that is asked for by itself.
 const COARSE_DEPTH: f64 = 1e-4;
 const FINE_DEPTH: f64 = 1e-8;
@@ -266,6 +271,7 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
         let mut found = Crossings { depths_mm: Vec::new(), up_to_mm: 0.0 };
         let Some(free) = self.modulus(0.0)? else { return Ok(found) };
         let mut before = (0.0, free.ln());
+        let mut earlier = before;
         for step in 1..=SCAN {
             let mut depth = reach_mm * f64::from(step) / f64::from(SCAN);
             let mut modulus = self.modulus(depth)?;
@@ -278,8 +284,16 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
             let Some(modulus) = modulus else { break };
             let here = (depth, modulus.ln());
             found.up_to_mm = depth;
+            if let Some(top) = self.peak(earlier, before, here)? {
+                found.depths_mm.push(self.root(earlier, top, relative)?);
+                if only_first {
+                    found.up_to_mm = reach_mm;
+                    break;
+                }
+                found.depths_mm.push(self.root(top, here, relative)?);
+            }
             // The free vise decays; without any damping its modulus is 1 to round-off and counts as stable.
-            if (before.1 < 1e-9) != (here.1 < 1e-9) {
+            if (before.1 < STABLE) != (here.1 < STABLE) {
                 found.depths_mm.push(self.root(before, here, relative)?);
                 if only_first {
                     found.up_to_mm = reach_mm;
@@ -289,9 +303,36 @@ impl<'a, const N: usize, const P: usize> Column<'a, N, P> {
             if is_last {
                 break;
             }
-            before = here;
+            (earlier, before) = (before, here);
         }
         Ok(found)
+    }
+
+    /// Where ln |mu| is above 0 between three depths at which it is not: an island that is thinner than a step of the scan.
+    /// It is looked for where the slope beside the middle one would lead there.
+    fn peak(&self, a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Result<Option<(f64, f64)>, Failure> {
+        let is_peak = b.0 > a.0 && b.1 < STABLE && b.1 >= a.1 && b.1 >= c.1;
+        if !is_peak || b.1 + (b.1 - a.1).max(b.1 - c.1) < STABLE {
+            return Ok(None);
+        }
+        let (mut low, mut top, mut high) = (a.0, b, c.0);
+        for _ in 0..PEAK {
+            let is_left = top.0 - low > high - top.0;
+            let end = if is_left { low } else { high };
+            let depth = top.0 + GOLDEN * (end - top.0);
+            let Some(modulus) = self.modulus(depth)? else { return Ok(None) };
+            let here = (depth, modulus.ln());
+            if here.1 >= STABLE {
+                return Ok(Some(here));
+            }
+            match (here.1 > top.1, is_left) {
+                (true, true) => (high, top) = (top.0, here),
+                (true, false) => (low, top) = (top.0, here),
+                (false, true) => low = depth,
+                (false, false) => high = depth,
+            }
+        }
+        Ok(None)
     }
 
     /// Where ln |mu| is 0 between two depths of different sign: regula falsi with the Illinois weight.

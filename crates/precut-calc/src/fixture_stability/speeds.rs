@@ -19,6 +19,8 @@ const HALVINGS: u32 = 24;
 /// Better speeds that are told, and peaks that are tried for them at most.
 const BETTER_SPEEDS: usize = 3;
 const TRIED: usize = 6;
+/// So often chatter is looked for again at the depth that is told.
+const LOOKED_AGAIN: usize = 4;
 /// A better speed removes more by at least this share.
 const WORTH: f64 = 0.02;
 
@@ -159,6 +161,26 @@ fn removed_here(study: &Study<'_>, most_mm: f64) -> Result<f64, Failure> {
     Ok(as_asked.map_or(safe, |asked| asked.max(safe)))
 }
 
+/// The limits at a speed with the depth that keeps off them, as it is read. Chatter is looked for again up to where that depth is
+/// near it: a scan over a smaller range finds thinner islands.
+fn kept_off(study: &Study<'_>, there: Working, mut limit: SpeedLimit) -> Result<Option<(SpeedLimit, f64)>, Failure> {
+    let case = &study.case;
+    for _ in 0..LOOKED_AGAIN {
+        let safe_mm = limit.safe_mm();
+        if safe_mm <= 0.0 {
+            return Ok(None);
+        }
+        let depth_mm = said(safe_mm, 3, f64::floor);
+        let near_mm = depth_mm / NEAR_LIMIT;
+        let again = critical_depth(&study.rules, &case.holding, &case.cutting, there, near_mm, study.monitor)?;
+        match again.depth_mm.filter(|chatter_mm| *chatter_mm < near_mm * (1.0 - 1e-6)) {
+            None => return Ok(Some((limit, depth_mm))),
+            nearer => limit.chatter_mm = nearer,
+        }
+    }
+    Ok(None)
+}
+
 /// A better speed, tried before it is told: not near chatter, an opening joint or slip, within the other limits, as it is read.
 /// `None` where the cut then does not hold still after all (a large motion may stand beside the stable one, and the entry asks
 /// more of a joint than the steady cut).
@@ -169,12 +191,10 @@ fn tried(study: &Study<'_>, spindle_speed_rpm: f64, most_mm: f64) -> Result<Opti
     let there = Working { spindle_rpm, ..case.working };
     let chatter: ChatterLimit =
         critical_depth(&study.rules, &case.holding, &case.cutting, there, most_mm, study.monitor)?;
-    let limit = study.speed_limit(spindle_rpm, chatter)?;
-    let safe_mm = limit.safe_mm();
-    if safe_mm <= 0.0 {
+    let Some((limit, depth_mm)) = kept_off(study, there, study.speed_limit(spindle_rpm, chatter)?)? else {
         return Ok(None);
-    }
-    let working = Working { depth_mm: said(safe_mm, 3, f64::floor), ..there };
+    };
+    let working = Working { depth_mm, ..there };
     if !has_motion(case, working, study.monitor)? {
         return Ok(None);
     }
