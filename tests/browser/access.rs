@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::chromium::Page;
 use crate::service::Service;
 use crate::sizes::{pane, speak};
-use crate::{SETTLED, both};
+use crate::{SETTLED, looking};
 
 /// Version 4.14.1, see its folder.
 const AXE: &str = include_str!("vendor/axe-core/axe.min.js");
@@ -34,8 +34,8 @@ pub fn rooms(page: &mut Page, service: &Service) -> Vec<String> {
 /// Every calculator; all other states are looked at in `matrix.rs`.
 #[test]
 fn axe_finds_no_violation_on_any_page() {
-    let Some((_turn, mut page, service)) = both() else { return };
-    for (index, room) in rooms(&mut page, &service).iter().enumerate() {
+    let Some((_turn, mut page, service)) = looking() else { return };
+    for (index, room) in rooms(&mut page, service).iter().enumerate() {
         // Either scheme for every second one.
         page.screen(1440, 900, index % 2 == 1);
         page.open(&service.page(room));
@@ -63,8 +63,8 @@ fn axe_finds_no_violation_on_any_page() {
 
 #[test]
 fn no_page_is_wider_than_its_window() {
-    let Some((_turn, mut page, service)) = both() else { return };
-    let mut places = rooms(&mut page, &service);
+    let Some((_turn, mut page, service)) = looking() else { return };
+    let mut places = rooms(&mut page, service);
     places.extend(["", "jobs", "results", "models", "library", "studies"].map(str::to_owned));
     for place in &places {
         page.screen(360, 740, false);
@@ -85,7 +85,7 @@ fn no_page_is_wider_than_its_window() {
 /// Three faults in one row of a grid: their texts stand below it, and neither a column nor the page gets wider.
 #[test]
 fn long_faults_move_no_column() {
-    let Some((_turn, mut page, service)) = both() else { return };
+    let Some((_turn, mut page, service)) = looking() else { return };
     let columns = "[...document.querySelectorAll('.form .grid thead th')].map(it => Math.round(it.getBoundingClientRect().width))";
     for (width, height) in [(360, 740), (1024, 600), (2560, 1300)] {
         page.screen(width, height, false);
@@ -122,8 +122,8 @@ fn long_faults_move_no_column() {
 /// below the end of the page.
 #[test]
 fn no_word_is_broken_and_no_page_ends_in_emptiness() {
-    let Some((_turn, mut page, service)) = both() else { return };
-    let rooms = rooms(&mut page, &service);
+    let Some((_turn, mut page, service)) = looking() else { return };
+    let rooms = rooms(&mut page, service);
     let broken = "(() => { const broken = new Set(); \
         for (const it of document.querySelectorAll('.form .grid:not(.still) th, .row .label, .fold-title, legend, .figure-choice button, .panel-head span, [role=tab], .value-table th, .value-table td, .shell a')) { \
           if (!it.checkVisibility()) continue; \
@@ -159,7 +159,7 @@ fn no_word_is_broken_and_no_page_ends_in_emptiness() {
 
 #[test]
 fn the_keyboard_alone_is_enough() {
-    let Some((_turn, mut page, service)) = both() else { return };
+    let Some((_turn, mut page, service)) = looking() else { return };
     page.open(&service.page("deflection-compensation"));
     page.until(SETTLED);
     page.press("Tab");

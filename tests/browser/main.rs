@@ -32,7 +32,7 @@ mod words;
 #[path = "../support/stream.rs"]
 mod stream;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 
 use chromium::Page;
 use service::Service;
@@ -45,6 +45,14 @@ fn both() -> Option<(MutexGuard<'static, ()>, Page, Service)> {
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let page = Page::new()?;
     Some((turn, page, Service::start()))
+}
+
+/// A browser and the one service of all tests that only look at pages: what one has asked for is there for the next.
+fn looking() -> Option<(MutexGuard<'static, ()>, Page, &'static Service)> {
+    static SERVICE: LazyLock<Service> = LazyLock::new(Service::start);
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let page = Page::new()?;
+    Some((turn, page, &SERVICE))
 }
 
 /// The picture is there and nothing is on its way.

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::access::rooms;
 use crate::chromium::Page;
 use crate::sizes::{assert_fits, at_sizes, fits, pane};
-use crate::{SETTLED, both};
+use crate::{SETTLED, both, looking};
 
 /// A shaft with steps, a rest and a table of segments.
 const SHAFT: &str = "deflection-compensation?example=stepped_with_rest";
@@ -80,7 +80,7 @@ const IN_SIGHT: &str = "(it => { const box = it.getBoundingClientRect(); return 
 /// 4: the first screen has the answer and a picture of it, and the answer stays where one scrolls.
 #[test]
 fn the_first_screen_shows_the_answer_and_its_picture() {
-    let Some((_turn, mut page, service)) = both() else { return };
+    let Some((_turn, mut page, service)) = looking() else { return };
     for (turn, room) in
         ["deflection-compensation", "ring-roundness", "feed-schedule", "fixture-stability?example=lobes", "diagnosis"]
             .into_iter()

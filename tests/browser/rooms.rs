@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::{DRAWN, SETTLED, both};
+use crate::{DRAWN, SETTLED, both, looking};
 
 /// What stands along the abscissa of the main picture.
 const TICKS: &str =
@@ -15,7 +15,7 @@ const FEED: &str = "#field-cut-feed_mm_per_rev";
 
 #[test]
 fn every_calculator_shows_its_first_example_as_a_picture_with_words() {
-    let Some((_turn, mut page, service)) = both() else { return };
+    let Some((_turn, mut page, service)) = looking() else { return };
     page.open(&service.page(""));
     page.wait_for(".questions li");
     let rooms =

@@ -32,7 +32,8 @@ impl Service {
         let (tell, told) = std::sync::mpsc::channel();
         let (stop, stopped) = watch::channel(false);
         let thread = std::thread::spawn(move || {
-            let data = tempfile::tempdir().unwrap();
+            // Of a service that lasts as long as the tests nobody takes it away: it lies among what is built.
+            let data = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
             let mut config = Config { data: data.path().to_owned(), ..Config::default() };
             set(&mut config);
             let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
