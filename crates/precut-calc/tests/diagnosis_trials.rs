@@ -17,13 +17,13 @@ fn score(name: &'static str, class: Class, snr: f64, seed: u64, count: u64) -> S
 
 #[test]
 fn nothing_hidden_raises_no_alarm() {
-    let score = score("deflection-nothing", Class::Nothing, 0.0, 1, 40);
+    let score = score("deflection-nothing", Class::Nothing, 0.0, 1, 24);
     assert!(score.quiet.reaches(0.97), "{}", score.quiet);
 }
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let score = score("deflection-one", Class::One, 3.0, 2, 60);
+    let score = score("deflection-one", Class::One, 3.0, 2, 36);
     assert!(score.first_right.reaches(0.90), "{}", score.first_right);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.95), "{}", score.truth_listed);
@@ -36,13 +36,13 @@ fn one_hidden_cause_is_named_right_or_not_at_all() {
 
 #[test]
 fn two_hidden_causes_are_in_what_is_said() {
-    let score = score("deflection-two", Class::Two, 3.0, 3, 30);
+    let score = score("deflection-two", Class::Two, 3.0, 3, 18);
     assert!(score.truth_listed.reaches(0.85), "{}", score.truth_listed);
 }
 
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {
-    let score = score("deflection-outside", Class::Outside, 3.0, 4, 30);
+    let score = score("deflection-outside", Class::Outside, 3.0, 4, 18);
     assert!(score.unknown.reaches(0.93), "{}", score.unknown);
 }
 
