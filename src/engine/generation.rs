@@ -33,7 +33,7 @@ impl Generation {
 
     /// Does a write, after which something has changed: also where it failed, which may have been too late, and where whoever
     /// asked for it has gone.
-    async fn after<T: Send + 'static>(
+    pub(super) async fn after<T: Send + 'static>(
         &self,
         write: impl Future<Output = Result<T, StoreError>> + Send + 'static,
     ) -> Result<T, StoreError> {

@@ -105,6 +105,8 @@ pub enum ModelError {
     },
     /// The name is taken, and only a new one was wanted.
     Exists(String),
+    /// A process stores its own model under the name.
+    OfProcess(String),
     /// What was sent breaks rules.
     Invalid(Vec<Finding>),
     /// No such result is kept.
@@ -176,6 +178,9 @@ impl Engine {
         if !model::is_name(name) {
             let finding = Finding::new("bad_model_name", "").with("name", name.to_owned());
             return Err(ModelError::Invalid(vec![finding]));
+        }
+        if inner.processes.process(shelf.full(name)).await?.is_some() {
+            return Err(ModelError::OfProcess(name.to_owned()));
         }
         let content = match source {
             ModelSource::Result(key) => {
@@ -350,7 +355,7 @@ fn stored(kept: KeptDocument, content: ModelContent) -> StoredModel {
 }
 
 /// How unsure effects are that stand elsewhere in another list, or are left out of it.
-fn renumbered(unsure: &Value, place: impl Fn(usize) -> Option<usize>) -> Vec<JointUncertainty> {
+pub(super) fn renumbered(unsure: &Value, place: impl Fn(usize) -> Option<usize>) -> Vec<JointUncertainty> {
     let unsure: Vec<JointUncertainty> = serde_json::from_value(unsure.clone()).unwrap_or_default();
     let moved = |own: ParameterMove| {
         let effect = place((own.effect as usize).checked_sub(1)?)?;

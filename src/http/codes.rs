@@ -46,6 +46,8 @@ pub const CODES: &[(&str, u16)] = &[
     ("action_is_call_person", 409),
     ("job_cancelled", 409),
     ("job_not_finished", 409),
+    ("model_name_taken", 409),
+    ("model_of_process", 409),
     ("name_is_built_in", 409),
     ("part_number_taken", 409),
     ("process_exists", 409),

@@ -239,6 +239,7 @@ impl From<ModelError> for Problem {
                 }
             }
             ModelError::Exists(name) => Self::new(StatusCode::PRECONDITION_FAILED, "model_exists").with("name", name),
+            ModelError::OfProcess(name) => Self::new(StatusCode::CONFLICT, "model_of_process").with("name", name),
             ModelError::Invalid(findings) => Self::invalid_model(findings),
             ModelError::UnknownResult(key) => {
                 Self::new(StatusCode::NOT_FOUND, "unknown_result").with("key", key.to_string())

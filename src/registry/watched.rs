@@ -3,7 +3,9 @@
 use precut_calc::calculator::{
     Calculator, Failure, Finding, ForwardModel, Measured, MeasuredRow, Measurement, Monitor, Watched,
 };
-use precut_calc::process::{Decision, DocumentOf, GaugeCheck, Options, Outlook, PartOf, State, Watch, faults};
+use precut_calc::process::{
+    Decision, DocumentOf, GAUGE_SIZE, GaugeCheck, Options, Outlook, PartOf, State, Watch, faults,
+};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use utoipa::openapi::{RefOr, Schema};
@@ -25,6 +27,8 @@ pub(crate) struct Observed {
     pub(crate) commanded: fn(Value) -> Option<Value>,
     /// Conditions of a part that come and go, which may be told of the next one.
     pub(crate) conditions: &'static [&'static str],
+    /// Kind, field and unit of all that the model of a process may have a size of.
+    pub(crate) sizes: Vec<(&'static str, &'static str, &'static str)>,
     /// What a document and a part are made of as they are sent.
     pub(crate) document: Box<Entry>,
     pub(crate) part: Box<Entry>,
@@ -48,6 +52,11 @@ impl Observed {
             },
             // A registry lives as long as the process.
             conditions: Vec::leak(M::conditions(&M::Run::default()).into_iter().map(|(name, _)| name).collect()),
+            sizes: <M as ForwardModel>::CAUSES
+                .iter()
+                .flat_map(|cause| cause.parameters.iter().map(|own| (cause.kind, own.name, own.unit)))
+                .chain([GAUGE_SIZE])
+                .collect(),
             document: Box::new(Entry::of_body::<ProcessBody<M::Allowances>>(&meta, move |body| {
                 let fields = &mut body["properties"];
                 fields["quantity"]["enum"] = json!(quantities);
@@ -206,6 +215,9 @@ pub(crate) trait Watching: Send + Sync {
         conditions: &[(String, f64)],
         monitor: &dyn Monitor,
     ) -> Result<Option<Value>, Failure>;
+    /// The model as later jobs take it, `{"effects", "effects_uncertainty", "part_type", "with_profile"}`; nothing while the process
+    /// is learned.
+    fn stored(&mut self, monitor: &dyn Monitor) -> Result<Option<Value>, Failure>;
     /// What a person says of a change, and what is said then; nothing where that does not fit.
     fn decide(&mut self, change: &str, decision: &Decision) -> Option<State>;
     /// The same once more.
@@ -238,6 +250,10 @@ impl<M: Watched> Watching for Watch<M> {
         }
         let run: M::Run = serde_json::from_value(run).map_err(|error| Failure::Internal(error.to_string()))?;
         Ok(Watch::next(self, part_type, &run, monitor)?.map(|next| json!(next.job)))
+    }
+
+    fn stored(&mut self, monitor: &dyn Monitor) -> Result<Option<Value>, Failure> {
+        Ok(Watch::stored(self, monitor)?.map(|model| json!(model)))
     }
 
     fn decide(&mut self, change: &str, decision: &Decision) -> Option<State> {

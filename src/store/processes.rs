@@ -148,6 +148,8 @@ pub struct Addition {
     pub after: Option<i64>,
     /// Its document, where that is new.
     pub document: Option<NewDocument>,
+    /// The model that it stores in its name, where that is new.
+    pub model: Option<NewDocument>,
     /// What happened.
     pub entries: Vec<NewEntry>,
     /// The parts of which something else is said now.
@@ -166,7 +168,8 @@ impl Addition {
     /// What it takes, bytes.
     pub(super) fn bytes(&self) -> u64 {
         let entries: usize = self.entries.iter().map(NewEntry::bytes).sum();
-        (entries + self.document.as_ref().map_or(0, |document| document.content.len())) as u64
+        let documents = self.document.iter().chain(&self.model).map(|document| document.content.len());
+        (entries + documents.sum::<usize>()) as u64
     }
 }
 

@@ -131,6 +131,90 @@ async fn the_tailstock_that_softened_at_part_37_is_told_part_by_part() {
     server.stop().await;
 }
 
+/// Whether two documents are the same but for the last digits of their numbers.
+fn nearly_equal(one: &Value, other: &Value) -> bool {
+    match (one, other) {
+        (Value::Number(one), Value::Number(other)) => {
+            let (one, other) = (one.as_f64().unwrap(), other.as_f64().unwrap());
+            (one - other).abs() <= 1e-9 * one.abs().max(1.0)
+        }
+        (Value::Array(one), Value::Array(other)) => {
+            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| nearly_equal(one, other))
+        }
+        (Value::Object(one), Value::Object(other)) => {
+            one.len() == other.len() && one.iter().all(|(name, one)| nearly_equal(one, &other[name]))
+        }
+        (one, other) => one == other,
+    }
+}
+
+#[tokio::test]
+async fn its_model_can_be_used_by_any_job() {
+    let server = server().await;
+    with_parts(&server, 37).await;
+    problem(server.get("/v1/models/shaft-560").send().await.unwrap(), 404, "unknown_model").await;
+    assert_eq!(got(&server, "/v1/processes/shaft-560").await["links"]["model"], Value::Null);
+    let accepted = async |number: usize| {
+        let said = put_part(&server, number).await;
+        assert_eq!(said["model"]["name"], "shaft-560");
+        said["news"].as_array().unwrap().contains(&json!("accepted"))
+    };
+    let mut number = 38;
+    while !accepted(number).await {
+        number += 1;
+        assert!(number < 46, "nothing joined the model");
+    }
+    let address = got(&server, "/v1/processes/shaft-560").await["links"]["model"].as_str().unwrap().to_owned();
+    let figures = got(&server, "/v1/processes/shaft-560/figures").await;
+    let drawn = figures["items"].as_array().unwrap().iter().find(|figure| figure["id"] == "model").unwrap();
+    let panel =
+        drawn["panels"].as_array().unwrap().iter().find(|panel| panel["y"]["label"] == "delta_um_per_n").unwrap();
+    let curves: Vec<&Value> = panel["items"].as_array().unwrap().iter().map(|item| &item["name"]).collect();
+    assert!(curves.contains(&&json!("tailstock_compliance")), "{panel}");
+    let picture = server.get("/v1/processes/shaft-560/state?figure=model").header("accept", "image/svg+xml");
+    assert_eq!(picture.send().await.unwrap().status(), 200);
+    let model = got(&server, &address).await;
+    assert_eq!((&model["revision"], &model["provenance"]["after_part"]), (&json!(1), &json!(number)), "{model}");
+    assert_eq!(model["provenance"]["changes"][0]["since_part"], 37);
+    assert!(!model["provenance"]["effects_uncertainty"].as_array().unwrap().is_empty());
+    // The base job with the model is the job that the process proposes for the next part.
+    let mut job = declared()["part_types"]["A"]["job"].clone();
+    job["model"] = json!("shaft-560");
+    let solved = send(&server, Method::POST, "/v1/deflection-compensation", &job).send().await.unwrap();
+    let (status, text) = (solved.status(), solved.text().await.unwrap());
+    assert_eq!(status, 200, "{text}");
+    let next = got(&server, "/v1/processes/shaft-560/next?path=new_path").await;
+    let told = serde_json::from_str::<Value>(&text).unwrap();
+    assert!(nearly_equal(&told["input"]["effects"], &next["job"]["effects"]), "{told} {next}");
+    // Its name is its own.
+    let other = json!({ "calculator": model["calculator"], "effects": model["effects"] });
+    problem(put(&server, &address, &other).await, 409, "model_of_process").await;
+    assert_eq!(put(&server, "/v1/models/shaft-9", &other).await.status(), 201);
+    problem(put(&server, "/v1/processes/shaft-9", &declared()).await, 409, "model_name_taken").await;
+    // A decision that takes the change out of the model is in its next revision.
+    let rejected = json!({ "decision": "reject" });
+    let rejected = send(&server, Method::POST, "/v1/processes/shaft-560/changes/c1", &rejected).send().await.unwrap();
+    assert_eq!(rejected.status(), 200);
+    let model = got(&server, &address).await;
+    assert_eq!((&model["revision"], &model["provenance"]["changes"]), (&json!(2), &json!([])));
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn without_its_last_part_a_process_has_no_state() {
+    let server = server().await;
+    assert_eq!(put(&server, "/v1/processes/shaft-560", &declared()).await.status(), 201);
+    put_part(&server, 1).await;
+    let gone = server.client.delete(server.url("/v1/processes/shaft-560/parts/p-1")).send().await.unwrap();
+    assert_eq!(gone.json::<Value>().await.unwrap()["process"], "shaft-560");
+    assert_eq!(got(&server, "/v1/processes/shaft-560").await["state"], Value::Null);
+    assert_eq!(got(&server, "/v1/processes/shaft-560/changes").await["items"], json!([]));
+    let table = server.get("/v1/processes/shaft-560/state?table=changes").header("accept", "text/csv").send().await;
+    assert_eq!(table.unwrap().status(), 200);
+    assert_eq!(got(&server, "/v1/processes/shaft-560/state").await, Value::Null);
+    server.stop().await;
+}
+
 #[tokio::test]
 async fn a_part_is_taken_once_and_corrected_by_who_has_seen_it() {
     let server = server().await;
@@ -198,6 +282,7 @@ async fn the_order_in_which_parts_arrive_changes_no_digit() {
     for field in ["process", "sequence", "action"] {
         found[field] = expected[field].clone();
     }
+    found["model"]["name"] = expected["model"]["name"].clone();
     assert_eq!(found, expected);
     server.stop().await;
 }
@@ -355,7 +440,7 @@ async fn what_a_new_path_brought_is_told_drawn_and_given_as_a_table() {
     assert_eq!(gain["parts_cut_with_new_path"], 47);
     let gained = gain["form_gain_um"].as_f64().unwrap();
     assert!(gained > state["gain"]["form_gain_um"].as_f64().unwrap(), "{gain}");
-    assert_eq!(figures(got(&server, "/v1/processes/shaft-560/figures").await), ["chart", "gain", "next"]);
+    assert_eq!(figures(got(&server, "/v1/processes/shaft-560/figures").await), ["chart", "gain", "model", "next"]);
     let table = async |name: &str| {
         let asked = server.get(&format!("/v1/processes/shaft-560/state?table={name}")).header("accept", "text/csv");
         asked.send().await.unwrap().text().await.unwrap()
@@ -478,6 +563,7 @@ async fn a_whole_record_goes_out_and_in() {
     for field in ["process", "action"] {
         copied[field] = own[field].clone();
     }
+    copied["model"]["name"] = own["model"]["name"].clone();
     assert_eq!(copied, own);
     assert_eq!(got(&server, "/v1/processes/copy/export").await["sha256"], record["sha256"]);
     server.stop().await;
@@ -526,6 +612,7 @@ async fn a_history_comes_as_a_table_and_a_part_as_a_bare_one() {
     for field in ["process", "action"] {
         found[field] = expected[field].clone();
     }
+    found["model"]["name"] = expected["model"]["name"].clone();
     assert_eq!(found, expected);
     let short = server.client.post(server.url("/v1/processes/table/parts")).header("content-type", "text/csv");
     let refused = problem(short.body("part,z_mm\na,1\n").send().await.unwrap(), 422, "invalid_process").await;

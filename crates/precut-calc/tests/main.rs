@@ -94,6 +94,7 @@ mod path_chords;
 mod process_figures;
 mod process_gain;
 mod process_loop;
+mod process_stored;
 mod process_streams;
 mod process_support;
 mod process_watch;

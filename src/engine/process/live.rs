@@ -312,6 +312,14 @@ impl Live {
         Ok(computed.map_err(Error::Calculation)?)
     }
 
+    /// The model as it is by now; nothing while the process is learned.
+    pub(super) async fn found_model(&self) -> Result<Option<Value>, ProcessError> {
+        let mut watch = self.at.watch.copy();
+        let computed = tokio::task::spawn_blocking(move || watch.stored(&Unwatched));
+        let computed = computed.await.map_err(|error| Error::internal(error.to_string()))?;
+        Ok(computed.map_err(Error::Calculation)?)
+    }
+
     fn look_ahead(&mut self) -> Result<(), ProcessError> {
         self.outlook = self.at.watch.outlook(&Unwatched).map_err(Error::Calculation)?;
         Ok(())

@@ -11,6 +11,7 @@ mod next;
 mod part;
 mod record;
 mod said;
+mod stored;
 mod table;
 
 use std::collections::HashMap;
@@ -79,6 +80,8 @@ pub enum ProcessError {
     UnknownChange(String),
     /// The name is taken.
     Exists(String),
+    /// A stored model that is of no process has the name under which this one would store its own.
+    ModelTaken(String),
     /// Another part has the number.
     NumberTaken {
         /// The number.
@@ -186,7 +189,12 @@ impl Inner {
     /// Adds to a process; tells who listens.
     async fn add(&self, addition: Addition) -> Result<Option<i64>, ProcessError> {
         let bytes: usize = addition.entries.iter().map(|entry| entry.content.len() + entry.said.len()).sum();
-        match self.processes.add_to_process(addition).await? {
+        let with_model = addition.model.is_some();
+        let processes = Arc::clone(&self.processes);
+        let added = async move { processes.add_to_process(addition).await };
+        // What a model says counts for every job that comes after it.
+        let added = if with_model { self.generation.after(added).await? } else { added.await? };
+        match added {
             Added::Done { sequence, .. } => {
                 self.live_processes.told();
                 Ok(Some(sequence))
@@ -255,11 +263,15 @@ impl Engine {
     ) -> Result<bool, ProcessError> {
         let inner = &self.inner;
         let full = shelf.full(name);
+        if there.is_none() {
+            inner.model_name_is_free(shelf, name).await?;
+        }
         let content = document.content()?;
-        let (mut parts, mut state) = (Vec::new(), None);
+        let (mut parts, mut state, mut stored) = (Vec::new(), None, None);
         if there.is_some() {
             let live = Live::load(inner, &full, Some(document.clone())).await?;
             parts = live.nows().collect();
+            stored = live.stored_model(&full, None).await?;
             state = live.state(name, there.map_or(0, |there| there.sequence) + 1);
         }
         let entry = NewEntry {
@@ -283,6 +295,7 @@ impl Engine {
             process: full,
             after: there.map(|there| there.sequence),
             document: Some(kept),
+            model: stored,
             entries: vec![entry],
             parts,
             tells: Vec::new(),
@@ -420,6 +433,7 @@ impl Engine {
             decided.sequence += 1;
             let content = body::decision(change, decided.last(), &decision, note.as_deref());
             let state = decided.state(name, decided.sequence);
+            let stored = decided.stored_model(&full, Some(live)).await?;
             let entry = NewEntry {
                 kind: EntryKind::Decision,
                 part: None,
@@ -433,6 +447,7 @@ impl Engine {
                 process: full.clone(),
                 after: Some(live.sequence),
                 document: None,
+                model: stored,
                 entries: vec![entry],
                 parts: Vec::new(),
                 tells: Vec::new(),
@@ -446,6 +461,13 @@ impl Engine {
             }
         }
         Err(Error::Busy { retry_after: super::json::RETRY_AFTER }.into())
+    }
+
+    /// Kind, field and unit of all that the model of a process may have a size of, by its document.
+    pub fn process_sizes(&self, document: &Value) -> Vec<(&'static str, &'static str, &'static str)> {
+        let calculator = document["calculator"].as_str().unwrap_or_default();
+        let observed = self.inner.registry.entry(calculator).and_then(|entry| entry.observed());
+        observed.map(|observed| observed.sizes.clone()).unwrap_or_default()
     }
 
     /// Something may have been added to some process when this changes.

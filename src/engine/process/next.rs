@@ -133,6 +133,7 @@ impl Engine {
                 process: full.clone(),
                 after: Some(live.sequence),
                 document: None,
+                model: None,
                 entries: vec![entry],
                 parts: Vec::new(),
                 tells: Vec::new(),

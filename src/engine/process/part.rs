@@ -178,7 +178,8 @@ impl Engine {
             next.sequence = live.sequence + i64::try_from(texts.len()).unwrap_or(0);
             let addition = next.history(&full, process, (live.sequence, &texts), &owner);
             let state = addition.state.as_deref().map(read).transpose()?.unwrap_or_default();
-            let addition = Addition { quota: inner.settings.quota, ..addition };
+            let model = next.stored_model(&full, Some(live)).await?;
+            let addition = Addition { quota: inner.settings.quota, model, ..addition };
             let told: Vec<Value> = next.said_of().iter().map(|(part, state)| brief(part, state)).collect();
             if inner.add(addition).await?.is_some() {
                 *seated = Some(next);
@@ -355,8 +356,9 @@ impl Inner {
         let mut next = back.ran(all).await?;
         next.sequence = live.sequence + 1;
         let outcome = if revision == 1 { PartOutcome::Taken } else { PartOutcome::Corrected };
-        let mut said = next.state(process, next.sequence).unwrap_or_else(|| json!({ "process": process }));
-        let state = said.clone();
+        // Without its last part a process has no state, as before its first.
+        let state = next.state(process, next.sequence);
+        let mut said = state.clone().unwrap_or_else(|| json!({ "process": process }));
         said["part"] = json!(part);
         said["number"] = json!(number);
         said["revision"] = json!(revision);
@@ -377,15 +379,17 @@ impl Inner {
             said: said.to_string(),
             created_ms: None,
         };
+        let stored = next.stored_model(full, Some(live)).await?;
         let tells = live.document.told(kind, &news).map(|callback| (0, callback)).into_iter().collect();
         let addition = Addition {
             process: full.to_owned(),
             after: Some(live.sequence),
             document: None,
+            model: stored,
             entries: vec![entry],
             parts,
             tells,
-            state: Some(state.to_string()),
+            state: state.map(|state| state.to_string()),
             owner: owner.to_owned(),
             quota: self.settings.quota,
         };
@@ -443,6 +447,7 @@ impl Live {
             process: full.to_owned(),
             after: Some(after),
             document: None,
+            model: None,
             entries,
             parts,
             // A history that comes at once happened long ago.

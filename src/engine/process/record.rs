@@ -53,6 +53,7 @@ impl Engine {
         if inner.processes.process(full.clone()).await?.is_some() {
             return Err(ProcessError::Exists(name.to_owned()));
         }
+        inner.model_name_is_free(shelf, name).await?;
         let (mut entries, mut document, mut paths) = (Vec::new(), None, Vec::new());
         let mut latest: Vec<(String, Option<u32>, usize, String)> = Vec::new();
         let mut decisions = Vec::new();
@@ -108,6 +109,7 @@ impl Engine {
             entry: Some((*number, *place)),
             now: now_of(part),
         });
+        let stored = live.stored_model(&full, None).await?;
         let content = document.content()?;
         let kept = NewDocument {
             kind: Kind::Process,
@@ -121,6 +123,7 @@ impl Engine {
             process: full,
             after: None,
             document: Some(kept),
+            model: stored,
             entries,
             parts: parts.collect(),
             tells: Vec::new(),

@@ -33,6 +33,7 @@ pub(super) fn state(
         for (field, value) in told.as_object().into_iter().flatten() {
             said[field] = value.clone();
         }
+        said["model"]["name"] = json!(name);
         said["action"]["reason"] = json!(texts.remark(english, &outlook.action.message()));
         said["action"]["next"] = json!(format!("/v1/processes/{name}/next"));
     }

@@ -168,7 +168,7 @@ pub(super) fn schemas(registry: &Registry) -> Vec<(String, RefOr<Schema>)> {
                 "sequence": count("Number of the last entry of its record.", 41), "created_at": time,
                 "document": reference("ProcessSent"),
                 "state": reference("ProcessState"),
-                "links": open("Where to go from here."),
+                "links": open("Where to go from here; `model` is its own stored model, null before a change joined it."),
             },
         }),
     );

@@ -1,4 +1,6 @@
-//! Pictures of a process: the control chart, what its paths brought, and what is expected of the next part.
+//! Pictures of a process: the control chart, what its paths brought, its model over the parts, and what is expected of the next part.
+
+use std::collections::BTreeMap;
 
 use axum::Extension;
 use axum::extract::{Path, State};
@@ -18,7 +20,7 @@ use crate::engine::{KeptProcess, Shelf};
 use crate::store::processes::KeptPart;
 
 /// Their names.
-pub(in crate::http) const FIGURES: &[&str] = &["chart", "gain", "next"];
+pub(in crate::http) const FIGURES: &[&str] = &["chart", "gain", "model", "next"];
 /// Parts that are read at once.
 const PAGE: u32 = 1000;
 /// A chart shows no more of the last parts.
@@ -53,13 +55,35 @@ pub(super) async fn all(app: &App, shelf: &Shelf, process: &KeptProcess) -> Resu
     }
     let state = process.state.clone().unwrap_or_default();
     let next = parts.last().and_then(|last| next(&state, last, &process.document));
-    Ok([chart(&state, &parts)].into_iter().chain(gain(&parts)).chain(next).collect())
+    let sizes = app.engine.process_sizes(&process.document);
+    let model = model(&parts, &sizes);
+    Ok([chart(&state, &parts)].into_iter().chain(gain(&parts)).chain(model).chain(next).collect())
 }
 
-/// What was said after a part, as far as the account goes.
+/// What was said after a part, as far as it is told over the parts.
 #[derive(Debug, Default, Deserialize)]
 pub(super) struct Said {
     pub(super) gain: Option<Gained>,
+    model: Option<SaidModel>,
+}
+
+/// The model after a part.
+#[derive(Debug, Deserialize)]
+struct SaidModel {
+    sizes: Vec<SaidSize>,
+}
+
+/// A size of the model after a part.
+#[derive(Debug, Deserialize)]
+struct SaidSize {
+    kind: String,
+    #[serde(default)]
+    label: String,
+    #[serde(default)]
+    shape: Value,
+    parameter: String,
+    delta: f64,
+    interval_95: [f64; 2],
 }
 
 /// The account after a part.
@@ -117,6 +141,55 @@ fn gain(parts: &[KeptPart]) -> Option<Figure> {
             panel(Axis::linear("process_form_gain", "um"), form),
             panel(Axis::linear("process_count", "1"), count),
         ],
+    })
+}
+
+/// Of which kind, which of them, and of which form: what tells a size of the model from the others.
+type WhichSize<'a> = (usize, &'a str, String);
+
+/// The sizes of the model over the parts, as they were told after each: a panel for each field of a cause. Nothing where nothing
+/// was told.
+fn model(parts: &[KeptPart], known: &[(&'static str, &'static str, &'static str)]) -> Option<Figure> {
+    let told: Vec<(f64, Vec<SaidSize>)> =
+        parts.iter().filter_map(|part| Some((number_of(part), Said::after(part).model?.sizes))).collect();
+    let mut over: BTreeMap<WhichSize<'_>, Vec<(f64, &SaidSize)>> = BTreeMap::new();
+    for (number, sizes) in &told {
+        for size in sizes {
+            let is_it = |own: &(&str, &str, &str)| own.0 == size.kind && own.1 == size.parameter;
+            let Some(which) = known.iter().position(is_it) else { continue };
+            over.entry((which, &size.label, size.shape.to_string())).or_default().push((*number, size));
+        }
+    }
+    let mut panels: Vec<(usize, Panel)> = Vec::new();
+    for ((which, ..), told) in over {
+        let (kind, parameter, unit) = known[which];
+        let x: Vec<f64> = told.iter().map(|(number, _)| *number).collect();
+        let end = |which: usize| told.iter().map(|(_, size)| size.interval_95[which]).collect();
+        let items = [
+            Item::Band {
+                name: "process_size_band",
+                x: x.clone(),
+                lower: end(0),
+                upper: end(1),
+                role: Role::Uncertainty,
+            },
+            Item::Line { name: kind, x, y: told.iter().map(|(_, size)| Some(size.delta)).collect(), role: Role::After },
+        ];
+        match panels.last_mut().filter(|(last, _)| *last == which) {
+            Some((_, panel)) => panel.items.extend(items),
+            None => {
+                let y = Axis::linear(parameter, unit);
+                panels.push((which, Panel { y, height: 1.0, items: items.to_vec() }));
+            }
+        }
+    }
+    let panels: Vec<Panel> = panels.into_iter().map(|(_, panel)| panel).collect();
+    (!panels.is_empty()).then(|| Figure {
+        id: "model",
+        title: Message::new("process_model"),
+        frame: Frame::Stacked,
+        x: Axis::linear("process_part_number", "1"),
+        panels,
     })
 }
 

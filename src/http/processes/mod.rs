@@ -117,6 +117,8 @@ fn time(ms: i64) -> String {
 fn document(process: &KeptProcess, language: Language) -> Value {
     let address = format!("/v1/processes/{}", process.name);
     let under = |part: &str| format!("{address}/{part}");
+    let with_model = |state: &Value| state["model"]["revision"].as_u64().is_some_and(|revision| revision > 1);
+    let model = process.state.as_ref().is_some_and(with_model).then(|| format!("/v1/models/{}", process.name));
     json!({
         "name": process.name,
         "revision": process.revision,
@@ -126,7 +128,7 @@ fn document(process: &KeptProcess, language: Language) -> Value {
         "state": process.state.clone().map(|state| in_language(state, language)),
         "links": {
             "self": address, "parts": under("parts"), "state": under("state"), "changes": under("changes"),
-            "next": under("next"), "events": under("events"), "export": under("export"),
+            "next": under("next"), "events": under("events"), "export": under("export"), "model": model,
         },
     })
 }
@@ -297,6 +299,7 @@ impl From<ProcessError> for Problem {
             ProcessError::UnknownPart(part) => Self::missing("unknown_process_part", &part),
             ProcessError::UnknownChange(change) => Self::missing("unknown_change", &change),
             ProcessError::Exists(name) => Self::new(StatusCode::CONFLICT, "process_exists").with("name", name),
+            ProcessError::ModelTaken(name) => Self::new(StatusCode::CONFLICT, "model_name_taken").with("name", name),
             ProcessError::NumberTaken { number, part } => Self::new(StatusCode::CONFLICT, "part_number_taken")
                 .with("number", f64::from(number))
                 .with("part", part),

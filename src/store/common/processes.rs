@@ -8,7 +8,7 @@ use super::callbacks::{WithCallback, note_entry, told};
 use super::documents::{delete as delete_document, put};
 use super::usage::usage_of;
 use crate::store::StoreError;
-use crate::store::documents::{Kind, NewDocuments, PutDocuments};
+use crate::store::documents::{Kind, NewDocument, NewDocuments, PutDocuments};
 use crate::store::processes::{Added, Addition, Entry, EntryKind, Head, KeptPart, NewEntry, PartNow, ProcessStore};
 use crate::store::quota::Quota;
 use crate::store::sql::{Lock, Outcome, Session, Writes, sql};
@@ -142,14 +142,12 @@ async fn add<S: Session>(connection: &mut S, new: &Addition) -> Outcome<Added> {
             return Ok(Added::Stale);
         }
     }
-    let mut kept_as = None;
-    if let Some(document) = &new.document {
-        let documents = vec![document.clone()];
-        let (owner, quota) = (new.owner.clone(), Quota::default());
-        let kept = NewDocuments { documents, only_new: false, unless_equal: false, owner, quota, most: u64::MAX };
-        if let PutDocuments::Kept(placed) = put(connection, &kept).await? {
-            kept_as = placed.first().map(|placed| placed.revision);
-        }
+    let kept_as = match &new.document {
+        Some(document) => keep(connection, new, document).await?,
+        None => None,
+    };
+    if let Some(model) = &new.model {
+        keep(connection, new, model).await?;
     }
     let before = there.unwrap_or(0);
     let sequence_of = |place: usize| before.saturating_add(1).saturating_add(i64::try_from(place).unwrap_or(i64::MAX));
@@ -167,6 +165,17 @@ async fn add<S: Session>(connection: &mut S, new: &Addition) -> Outcome<Added> {
     let head = sql("UPDATE processes SET sequence = $2, state = $3 WHERE name = $1");
     connection.run(head.bind(&new.process).bind(sequence).bind(&new.state)).await?;
     Ok(Added::Done { sequence, created_ms: now })
+}
+
+/// Keeps a document of a process, for which there is room; its revision.
+async fn keep<S: Session>(connection: &mut S, new: &Addition, document: &NewDocument) -> Outcome<Option<u32>> {
+    let documents = vec![document.clone()];
+    let (owner, quota) = (new.owner.clone(), Quota::default());
+    let kept = NewDocuments { documents, only_new: false, unless_equal: false, owner, quota, most: u64::MAX };
+    Ok(match put(connection, &kept).await? {
+        PutDocuments::Kept(placed) => placed.first().map(|placed| placed.revision),
+        _ => None,
+    })
 }
 
 async fn add_entry<S: Session>(

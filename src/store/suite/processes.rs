@@ -44,6 +44,7 @@ fn addition(after: Option<i64>, entries: Vec<NewEntry>) -> Addition {
         process: NAME.to_owned(),
         after,
         document: None,
+        model: None,
         parts: parts.collect(),
         entries,
         tells: Vec::new(),

@@ -145,22 +145,31 @@ pub(super) fn left_open<E: Serialize>(
             (Ok(below), Err(_)) => (below, numbers(0.0, direction)?, STEP),
             (Err(_), above) => (numbers(0.0, direction)?, above?, STEP),
         };
-        let mut moves = Vec::new();
-        for (index, (below, above)) in below.iter().zip(&above).enumerate() {
-            for ((parameter, low), (_, high)) in below.iter().zip(above) {
-                let turns = if parameter == PHASE { ((high - low) / TAU).round() } else { 0.0 };
-                let by = (high - low - TAU * turns) / between;
-                if by.abs() > 0.0 {
-                    let effect = u32::try_from(index + 1).unwrap_or(u32::MAX);
-                    moves.push(ParameterMove { effect, parameter: parameter.clone(), by });
-                }
-            }
-        }
-        if !moves.is_empty() {
-            open.push(JointUncertainty { moves });
-        }
+        open.extend(moved_between(&below, &above, between));
     }
     Ok(open)
+}
+
+/// How far the numbers of effects move with one standard deviation, where they were looked at so many of them apart; nothing where
+/// none moves.
+pub(crate) fn moves_between<E: Serialize>(below: &[E], above: &[E], apart: f64) -> Option<JointUncertainty> {
+    let numbers = |effects: &[E]| effects.iter().map(fields).collect::<Vec<_>>();
+    moved_between(&numbers(below), &numbers(above), apart)
+}
+
+fn moved_between(below: &[Vec<(String, f64)>], above: &[Vec<(String, f64)>], apart: f64) -> Option<JointUncertainty> {
+    let mut moves = Vec::new();
+    for (index, (below, above)) in below.iter().zip(above).enumerate() {
+        for ((parameter, low), (_, high)) in below.iter().zip(above) {
+            let turns = if parameter == PHASE { ((high - low) / TAU).round() } else { 0.0 };
+            let by = (high - low - TAU * turns) / apart;
+            if by.abs() > 0.0 {
+                let effect = u32::try_from(index + 1).unwrap_or(u32::MAX);
+                moves.push(ParameterMove { effect, parameter: parameter.clone(), by });
+            }
+        }
+    }
+    (!moves.is_empty()).then_some(JointUncertainty { moves })
 }
 
 /// Numbers of an effect by where they stand in it.

@@ -90,6 +90,7 @@ pub use foundation::Foundation;
 pub use gain::{Gain, gain};
 pub use identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW, Separation, Signature, separations, twins};
 pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS, PriorWeight};
+pub(crate) use known::moves_between;
 pub use known::{JointUncertainty, Known, ParameterMove};
 pub use next::NextMeasurement;
 pub use noise::{Noise, NoiseSource};

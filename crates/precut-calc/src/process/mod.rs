@@ -11,7 +11,7 @@
 //! - `sums`, `onsets`: every cause since every part as one hypothesis, by running sums (`process/3.2`);
 //! - `detector`: when to say that something changed; parts that are odd by themselves (`process/3.3`);
 //! - `verdict`: which cause, since when, how large (`process/3.5`);
-//! - `outlook`, `action`, `measure`, `next`: the next part (`process/4`, `process/5`);
+//! - `outlook`, `action`, `measure`, `next`: the next part (`process/4`, `process/5`); `stored`: the model for later jobs;
 //! - `account`: what paths brought (`process/6`);
 //! - `memory`, `follow`, `decide`: what is remembered of the parts, of a change from its alarm on, and what a person says of it;
 //! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
@@ -37,6 +37,7 @@ mod report;
 mod scatter;
 mod sight;
 mod state;
+mod stored;
 mod sums;
 mod verdict;
 mod watch;
@@ -48,5 +49,7 @@ pub use decide::Decision;
 pub use document::{Document, GaugeCheck, MOST_PARTS, Options, Part, PartType, Threshold};
 pub use next::Next;
 pub use report::EXPLANATION_CODES;
+pub use sight::GAUGE_SIZE;
 pub use state::*;
+pub use stored::StoredModel;
 pub use watch::{DocumentOf, PartOf, Watch};

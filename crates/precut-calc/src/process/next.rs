@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::null::{Null, Source};
-use super::sight::Catalogue;
+use super::null::{Column, Null, Source};
+use super::sight::{Catalogue, Sighting};
 use super::watch::Watch;
 use crate::calculator::{Calculator, Failure, Hypothesis, Measurement, Monitor, Over, Unnamed, Watched};
 use crate::diagnosis::{Bound, Setting, Subject, put};
@@ -41,6 +41,27 @@ impl<M: Watched> Watch<M> {
         conditions: &M::Run,
         monitor: &dyn Monitor,
     ) -> Result<Option<Next<<M as Calculator>::Input>>, Failure> {
+        let Some(ahead) = self.ahead(part_type, conditions, monitor)? else { return Ok(None) };
+        let memory = &self.memory;
+        let number = ahead.part.number;
+        let expected = memory.with_null(|told, null| {
+            let mean = memory.expected(&ahead.part, told, null).mean;
+            let changed: Vec<bool> = null.columns.iter().map(|column| column.since.is_some()).collect();
+            (mean, sizes(&memory.catalogue, null, &null.mean(), number, &changed))
+        });
+        let Some((wanted, changed)) = expected else { return Ok(None) };
+        let effects = ahead.effects(&changed, &memory.catalogue, &wanted, monitor)?;
+        let job = M::under(&self.eye.document.part_types[part_type].job, conditions, effects);
+        Ok(Some(Next { job, revision: memory.joined + 1 }))
+    }
+
+    /// The next part of this type and under these conditions, at places along all of it that is measured.
+    pub(super) fn ahead<'m>(
+        &mut self,
+        part_type: &str,
+        conditions: &M::Run,
+        monitor: &'m dyn Monitor,
+    ) -> Result<Option<Ahead<'m, M>>, Failure> {
         let Some(coming) = self.coming(part_type, conditions, monitor)? else { return Ok(None) };
         let (kind, number) = (coming.sighting.kind, coming.sighting.number);
         let job = &self.eye.document.part_types[part_type].job;
@@ -50,31 +71,56 @@ impl<M: Watched> Watch<M> {
         let points = || at.iter().map(|&share| M::point_along(job, share)).collect();
         let mut catalogue = self.memory.catalogue.clone();
         let signs = self.eye.signs_at(part_type, conditions, points(), &mut catalogue, monitor)?;
-        let along = Arc::new(signs).unmeasured(number, kind);
-        let memory = &self.memory;
-        let expected =
-            memory.with_null(|told, null| (memory.expected(&along, told, null).mean, self.changed(number, null)));
-        let Some((wanted, changed)) = expected else { return Ok(None) };
+        let part = Arc::new(signs).unmeasured(number, kind);
         let bound = self.eye.bound_at(part_type, conditions, points(), monitor)?;
-        let acting = bound.with_settings(&settings(&bound, &changed, &memory.catalogue))?;
-        let effects = with_rest(&bound, acting, &at, &wanted, monitor)?;
-        Ok(Some(Next { job: M::under(job, conditions, effects), revision: memory.joined + 1 }))
+        Ok(Some(Ahead { part, bound, at }))
+    }
+}
+
+/// A part that did not come yet, at places along it.
+pub(super) struct Ahead<'m, M: Watched> {
+    pub(super) part: Sighting,
+    pub(super) bound: Bound<'m, M>,
+    /// The places, as shares of the length.
+    at: Vec<f64>,
+}
+
+impl<M: Watched> Ahead<'_, M> {
+    /// The effects with which the calculator predicts what is wanted at the places: the causes at their sizes, and what is left
+    /// without a name.
+    pub(super) fn effects(
+        &self,
+        sizes: &[(usize, f64)],
+        catalogue: &Catalogue,
+        wanted: &DVector<f64>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<M::Effect>, Failure> {
+        let acting = self.acting(sizes, catalogue)?;
+        with_rest(&self.bound, acting, &self.at, wanted, monitor)
     }
 
-    /// Causes that changed, with their sizes in a part.
-    fn changed(&self, number: u32, null: &Null) -> Vec<(usize, f64)> {
-        let mean = null.mean();
-        let sizes = null.columns.iter().zip(mean.iter());
-        sizes
-            .filter_map(|(column, size)| match (column.source, column.since) {
-                (Source::Cause(variant), Some((since, form))) => Some((
-                    variant,
-                    size * column.sd * form.of(number, since) * self.memory.catalogue.variants[variant].prior_sd,
-                )),
-                _ => None,
-            })
-            .collect()
+    /// The effects of the base and those of the causes at their sizes.
+    pub(super) fn acting(&self, sizes: &[(usize, f64)], catalogue: &Catalogue) -> Result<Vec<M::Effect>, Failure> {
+        self.bound.with_settings(&settings(&self.bound, sizes, catalogue))
     }
+}
+
+/// Sizes of causes in a part, in the units of their fields, where so much of each column acts; of the columns that are chosen.
+pub(super) fn sizes(
+    catalogue: &Catalogue,
+    null: &Null,
+    amounts: &DVector<f64>,
+    number: u32,
+    chosen: &[bool],
+) -> Vec<(usize, f64)> {
+    let of = |((column, amount), chosen): ((&Column, &f64), &bool)| match column.source {
+        Source::Cause(variant) if *chosen => {
+            let acts = column.since.map_or(1.0, |(since, form)| form.of(number, since));
+            Some((variant, amount * column.sd * acts * catalogue.variants[variant].prior_sd))
+        }
+        _ => None,
+    };
+    null.columns.iter().zip(amounts.iter()).zip(chosen).filter_map(of).collect()
 }
 
 /// From where to where a part is measured, as shares of its length.

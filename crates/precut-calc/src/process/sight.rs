@@ -16,6 +16,8 @@ const LEVEL: &str = "size_offset";
 pub(super) const COSINES: usize = 8;
 /// The gauge is off: what it reads, not the part.
 pub(super) const GAUGE: &str = "gauge_offset";
+/// What is known of that: kind, field and unit. It is no effect of a job, so that no catalogue has it.
+pub const GAUGE_SIZE: (&str, &str, &str) = (GAUGE, "offset_um", "um");
 /// Prior standard deviation of that, on the radius as that of `size_offset`, um.
 const GAUGE_UM: f64 = 8.0;
 
@@ -256,8 +258,8 @@ impl<M: Watched> Eye<M> {
         let name = catalogue.name(GAUGE, "");
         let gauge = catalogue.variant(Variant {
             name,
-            parameter: "offset_um",
-            unit: "um",
+            parameter: GAUGE_SIZE.1,
+            unit: GAUGE_SIZE.2,
             prior_sd: GAUGE_UM,
             range: [f64::NEG_INFINITY, f64::INFINITY],
             setting: None,
