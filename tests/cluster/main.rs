@@ -28,6 +28,9 @@ mod certificates;
 #[allow(dead_code)] // not all of it is used here
 mod receiver;
 
+#[path = "../support/stream.rs"]
+mod stream;
+
 mod across;
 mod backup;
 mod chaos;
@@ -36,6 +39,7 @@ mod database;
 mod full;
 mod owners;
 mod process;
+mod processes;
 mod start;
 mod studies;
 mod tls;

@@ -9,7 +9,8 @@ use std::process::{Command, Stdio};
 use serde_json::{Value, json};
 
 use crate::small_disk::SmallDisk;
-use crate::support::header;
+use crate::stream::process_file;
+use crate::support::{address_of, header, precut_command};
 use crate::watch::{Service, assert_intact, database, refused_start, until};
 
 fn job(length: usize, duration_ms: u32) -> Value {
@@ -86,6 +87,51 @@ async fn with_a_full_disk_answers_go_on_jobs_are_refused_and_nothing_breaks() {
     assert!(said.contains("cannot be used"), "{said}");
     disk.make_room();
     println!("full disk, by kind of write:\n  {}\n  start: refused, {}", counts.join("\n  "), said.trim());
+}
+
+#[tokio::test]
+async fn a_part_that_a_full_disk_did_not_take_is_taken_once_there_is_room() {
+    let Some(disk) = SmallDisk::new("6m") else {
+        println!("no small disk can be mounted here");
+        return;
+    };
+    let data = disk.path().join("data");
+    let mut child =
+        precut_command(&["serve", "--listen", "127.0.0.1:0", "--data", data.to_str().unwrap()]).spawn().unwrap();
+    let address = address_of(&mut child);
+    let client = reqwest::Client::new();
+    let put = async |path: String, body: &Value| {
+        let sent =
+            client.put(format!("http://{address}/v1/processes/shaft-560{path}")).json(body).send().await.unwrap();
+        (sent.status().as_u16(), sent.json::<Value>().await.unwrap())
+    };
+    let mut process = process_file("r01-tailstock-softer.json");
+    let parts = process["parts"].take();
+    process.as_object_mut().unwrap().remove("parts");
+    assert_eq!(put(String::new(), &process).await.0, 201);
+    let part = async |number: usize| put(format!("/parts/p-{number}"), &parts[number - 1]).await;
+    for number in 1..=3 {
+        assert_eq!(part(number).await.0, 201);
+    }
+    disk.fill();
+    let mut number = 4;
+    let (status, said) = loop {
+        // What is left of a page takes a part or two.
+        let (status, said) = part(number).await;
+        if status != 201 {
+            break (status, said);
+        }
+        number += 1;
+    };
+    assert_eq!((status, &said["code"]), (507, &json!("disk_full")), "{said:#}");
+    let state = client.get(format!("http://{address}/v1/processes/shaft-560/state")).send().await.unwrap();
+    assert_eq!(state.json::<Value>().await.unwrap()["parts"], number - 1, "it was not taken");
+    disk.make_room();
+    let (status, said) = part(number).await;
+    assert_eq!((status, &said["parts"], &said["sequence"]), (201, &json!(number), &json!(number + 1)), "{said:#}");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_intact(&data).await;
 }
 
 #[tokio::test]

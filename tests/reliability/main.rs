@@ -15,6 +15,9 @@ mod support;
 #[allow(dead_code)] // not all of it is used here
 mod receiver;
 
+#[path = "../support/stream.rs"]
+mod stream;
+
 mod clients;
 mod damage;
 mod dice;
