@@ -219,7 +219,8 @@ function conditionOf(name, value, field) {
 }
 
 /** Whether a next measurement is advised: of what the list does not hold none can be told apart. */
-const advisesNext = result => Boolean(result.next_measurement) && (result.verdict !== 'unknown' || result.named.length > 0);
+// A run of which too many would be needed is no advice.
+const advisesNext = result => Boolean(result.next_measurement?.rows_needed) && (result.verdict !== 'unknown' || result.named.length > 0);
 export const nextAdvised = causes => Boolean(causes && !causes.isSilent && advisesNext(causes.result));
 
 export function Causes({ causes: { result, kinds, conditions, unit, isSilent }, sheet, answer, title, name, owns, stale }) {
@@ -266,16 +267,21 @@ export function Causes({ causes: { result, kinds, conditions, unit, isSilent }, 
       ${
         advisesNext(result) &&
         html`<h3>${t('next_measurement')}</h3>
-        <p class="run">${Object.entries(next.run)
-          .filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0))
-          .map(
-            ([name, value]) =>
-              html`<span key=${name} class=${next.changes.split(', ').includes(name) ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`,
-          )}</p>
+        ${[next, ...(next.further_runs ?? [])].map((own, index) => html`<${NextRun} key=${index} ...${{ own, conditions }} />`)}
         <p class="quiet">${t('next_separates', { leader: set(next.leader), rival: set(next.rival), now: number(next.separation_now_sigmas, 2), after: number(next.separation_then_sigmas, 2) })}</p>
         ${sheet && html`<${SheetButtons} ...${{ sheet, answer, name, owns, stale, title }} />`}`
       }
     </section>`;
+}
+
+/** The conditions of a run that is worth measuring, those that it changes marked. */
+function NextRun({ own: { run, changes }, conditions }) {
+  const stated = Object.entries(run).filter(([, value]) => value !== null && !(Array.isArray(value) && value.length === 0));
+  return html`
+    <p class="run">${stated.map(
+      ([name, value]) =>
+        html`<span key=${name} class=${changes.split(', ').includes(name) ? 'changed' : ''}>${conditionOf(name, value, conditions.get(name))}</span>`,
+    )}</p>`;
 }
 
 /** A share as a bar: solid for what the answer names, hollow for all else; of what only comes near no number is told. */

@@ -107,6 +107,16 @@ pub struct DiagnosisOptions {
     /// Go on although the data look like a wrong unit, a wrong sign or another blunder.
     #[schema(default = false, example = false)]
     pub accept_suspected_unit: bool,
+    /// How many runs are to be measured next, planned together.
+    #[schema(minimum = 1, maximum = 4, default = 1, example = 1, extensions(("x-symbol" = json!("n_next")), ("x-unit" = json!("1"))))]
+    pub next_runs: u8,
+    /// What a further run costs before anything is measured of it, in any unit of cost: runs are ranked by what it costs to settle
+    /// the question with them.
+    #[schema(minimum = 1e-6, maximum = 1e9, default = 1.0, example = 1.0, extensions(("x-symbol" = json!("c_run")), ("x-unit" = json!("1"))))]
+    pub cost_per_run: f64,
+    /// What a measured row of it costs, in the same unit.
+    #[schema(minimum = 0.0, maximum = 1e9, default = 0.0, example = 0.0, extensions(("x-symbol" = json!("c_row")), ("x-unit" = json!("1"))))]
+    pub cost_per_row: f64,
     /// Seed of the draws behind the intervals of decisions, and of the gain of classes.
     #[schema(minimum = 0, maximum = 4_294_967_295_u32, default = 1, example = 1, extensions(("x-symbol" = json!("s_0")), ("x-unit" = json!("1"))))]
     pub seed: u32,
@@ -136,6 +146,9 @@ impl Default for DiagnosisOptions {
             leave_outliers_out: true,
             held_out: true,
             accept_suspected_unit: false,
+            next_runs: 1,
+            cost_per_run: 1.0,
+            cost_per_row: 0.0,
             seed: 1,
         }
     }

@@ -11,14 +11,36 @@ use super::sparse::Sparse;
 use super::subject::{Setting, Subject};
 use super::weigh::{SetWeight, Verdict, Weighing};
 use super::whiten::Whitener;
-use crate::calculator::{Diagnosable, Failure, Monitor, NextRun, Ranges, Rows, checkpoint};
+use crate::calculator::{Diagnosable, Failure, ForwardModel, Monitor, NextRun, Ranges, Rows, checkpoint};
 
 /// Odds that settle a question.
 const SETTLING_ODDS: f64 = 20.0;
+/// A run of which more than so many would be needed to settle it is no advice.
+const MOST_RUNS: f64 = 20.0;
+
+/// Rivals that several runs are to part from the leader at most.
+const MOST_RIVALS: usize = 4;
 
 /// A run worth measuring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NextMeasurement<R> {
+    /// The run with which the question is settled at the least cost.
+    pub best: Looked<R>,
+    /// Separation of the leader from its strongest rival with the rows there are, sigmas.
+    pub separation_now: f64,
+    /// Hypotheses of the leader.
+    pub leader: Vec<usize>,
+    /// Hypotheses of its strongest rival; none for the base.
+    pub rival: Vec<usize>,
+    /// Runs to measure with it.
+    pub further: Vec<Further<R>>,
+    /// Every run that was looked at.
+    pub candidates: Vec<Looked<R>>,
+}
+
+/// A run that was looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Looked<R> {
     /// The condition that it changes.
     pub changes: &'static str,
     /// Its conditions.
@@ -27,24 +49,27 @@ pub struct NextMeasurement<R> {
     pub rows: usize,
     /// Where they would be measured: columns by the fields of a row.
     pub places: BTreeMap<String, Vec<Option<f64>>>,
-    /// Separation of the leader from its strongest rival with the rows there are, sigmas.
-    pub separation_now: f64,
-    /// The same with this run measured too.
+    /// Separation of the leader from its rival with this run measured too, sigmas.
     pub separation_then: f64,
     /// Bayes factor to be expected from this run alone.
     pub bayes_factor: f64,
-    /// Rows of this kind that would bring odds of 20 to 1; `None` where no number would.
-    pub rows_needed: Option<usize>,
-    /// Hypotheses of the leader.
-    pub leader: Vec<usize>,
-    /// Hypotheses of its strongest rival; none for the base.
-    pub rival: Vec<usize>,
-    /// Every run that was looked at: the condition that it changes, its conditions, and the separation with it measured
-    /// too, sigmas.
-    pub candidates: Vec<(&'static str, R, f64)>,
+    /// Rows of this kind that would bring odds of 20 to 1, and what they cost; `None` where no number would.
+    pub settles: Option<(usize, f64)>,
 }
 
-/// The run that parts the leader from its strongest rival best; `None` where there is no rival or no run.
+/// A run that is measured with those before it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Further<R> {
+    /// The run.
+    pub looked: Looked<R>,
+    /// Hypotheses of the rival that those before it part from the leader least.
+    pub rival: Vec<usize>,
+    /// Separation from that rival before it, sigmas.
+    pub separation_before: f64,
+}
+
+/// The run that parts the leader from its strongest rival at the least cost, and those that are best measured with it; `None`
+/// where there is no rival or no run.
 pub(super) fn next_measurement<M: Diagnosable>(
     job: &JobOf<M>,
     rows: &Rows<M::Run, M::Point>,
@@ -52,39 +77,110 @@ pub(super) fn next_measurement<M: Diagnosable>(
     monitor: &dyn Monitor,
 ) -> Result<Option<NextMeasurement<M::Run>>, Failure> {
     let Some((leader, rival)) = contenders(weighing) else { return Ok(None) };
-    let mut best: Option<NextMeasurement<M::Run>> = None;
     let now = Signature::of(weighing, &leader.members, &leader.settings)?;
     let other = match rival {
         Some(rival) => Signature::of(weighing, &rival.members, &rival.settings)?,
         None => Signature::nothing(&now),
     };
     let separation_now = now.separation(&other);
-    let mut candidates = Vec::new();
-    for candidate in M::next_runs(&job.job, rows, Ranges(&job.options.ranges)) {
-        checkpoint(monitor)?;
-        let then = separation_with::<M>(job, rows, &candidate, weighing, [Some(leader), rival], monitor)?;
-        // What was cancelled is no run beyond the model.
-        checkpoint(monitor)?;
-        let Some(separation_then) = then else { continue };
-        let gained = separation_then * separation_then - separation_now * separation_now;
-        candidates.push((candidate.changes, candidate.run.clone(), separation_then));
-        if best.as_ref().is_none_or(|best| separation_then > best.separation_then) {
-            best = Some(NextMeasurement {
+    let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
+    let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges));
+    let mut looked = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
+    let Some(best) = cheapest(&looked) else { return Ok(None) };
+    let first = looked[best].0;
+    let candidates: Vec<Looked<M::Run>> = looked.drain(..).map(|(_, looked)| looked).collect();
+    let best = candidates[best].clone();
+    let further = if best.settles.is_some() { planning.further(&runs, first, leader)? } else { Vec::new() };
+    let rival = rival.map_or_else(Vec::new, |rival| rival.members.clone());
+    Ok(Some(NextMeasurement { best, separation_now, leader: leader.members.clone(), rival, further, candidates }))
+}
+
+/// The one with which the question is settled at the least cost; where none settles it, that which parts most.
+fn cheapest<R>(looked: &[(usize, Looked<R>)]) -> Option<usize> {
+    let cost = |own: &Looked<R>| own.settles.map_or(f64::INFINITY, |(_, cost)| cost);
+    (0..looked.len()).min_by(|&a, &b| {
+        let (a, b) = (&looked[a].1, &looked[b].1);
+        cost(a).total_cmp(&cost(b)).then(b.separation_then.total_cmp(&a.separation_then))
+    })
+}
+
+/// What further runs are planned with.
+struct Planning<'a, M: Diagnosable> {
+    job: &'a JobOf<M>,
+    rows: &'a Rows<M::Run, M::Point>,
+    weighing: &'a Weighing<'a>,
+    monitor: &'a dyn Monitor,
+}
+
+type Run<M> = NextRun<<M as ForwardModel>::Run, <M as ForwardModel>::Point>;
+
+impl<M: Diagnosable> Planning<'_, M> {
+    /// Each run that the model can run, by its number, as it would part two sets with those of `before` measured too.
+    fn looked_at(
+        &self,
+        runs: &[Run<M>],
+        before: &[&Run<M>],
+        sets: [Option<&SetWeight>; 2],
+        separation_before: f64,
+    ) -> Result<Vec<(usize, Looked<M::Run>)>, Failure> {
+        let mut all = Vec::new();
+        for (number, candidate) in runs.iter().enumerate() {
+            checkpoint(self.monitor)?;
+            let added: Vec<&Run<M>> = before.iter().copied().chain([candidate]).collect();
+            let then = separation_with::<M>(self.job, self.rows, &added, self.weighing, sets, self.monitor)?;
+            // What was cancelled is no run beyond the model.
+            checkpoint(self.monitor)?;
+            let Some(separation_then) = then else { continue };
+            let rows = candidate.points.len();
+            let gained = separation_then * separation_then - separation_before * separation_before;
+            let options = &self.job.options;
+            let looked = Looked {
                 changes: candidate.changes,
-                rows: candidate.points.len(),
+                run: candidate.run.clone(),
+                rows,
                 places: columns::<M>(&candidate.points),
-                run: candidate.run,
-                separation_now,
                 separation_then,
-                bayes_factor: bayes_factor(separation_now, separation_then),
-                rows_needed: rows_needed(gained, candidate.points.len()),
-                leader: leader.members.clone(),
-                rival: rival.map_or_else(Vec::new, |rival| rival.members.clone()),
-                candidates: Vec::new(),
-            });
+                bayes_factor: bayes_factor(separation_before, separation_then),
+                settles: settles(gained, rows, [options.cost_per_run, options.cost_per_row]),
+            };
+            all.push((number, looked));
         }
+        Ok(all)
     }
-    Ok(best.map(|best| NextMeasurement { candidates, ..best }))
+
+    /// After the first run those that are asked for beside it, one by one: each parts the leader best from the rival that those
+    /// before it part least. A run that adds nothing is not added.
+    fn further(&self, runs: &[Run<M>], first: usize, leader: &SetWeight) -> Result<Vec<Further<M::Run>>, Failure> {
+        let mut chosen = vec![&runs[first]];
+        let mut further = Vec::new();
+        while chosen.len() < usize::from(self.job.options.next_runs) {
+            let mut least: Option<(f64, Option<&SetWeight>)> = None;
+            for rival in rivals(self.weighing, leader) {
+                let sets = [Some(leader), rival];
+                let parted = separation_with::<M>(self.job, self.rows, &chosen, self.weighing, sets, self.monitor)?;
+                if let Some(parted) = parted.filter(|parted| least.is_none_or(|(least, _)| *parted < least)) {
+                    least = Some((parted, rival));
+                }
+            }
+            let Some((separation_before, rival)) = least else { break };
+            let looked = self.looked_at(runs, &chosen, [Some(leader), rival], separation_before)?;
+            let Some(best) = cheapest(&looked).filter(|&best| looked[best].1.settles.is_some()) else { break };
+            let (number, looked) = looked[best].clone();
+            chosen.push(&runs[number]);
+            let rival = rival.map_or_else(Vec::new, |rival| rival.members.clone());
+            further.push(Further { looked, rival, separation_before });
+        }
+        Ok(further)
+    }
+}
+
+/// Sets that may be right instead of the leader, heaviest first; the base while it may be.
+fn rivals<'a>(weighing: &'a Weighing<'_>, leader: &SetWeight) -> Vec<Option<&'a SetWeight>> {
+    if matches!(weighing.verdict, Verdict::Adequate) {
+        return vec![None];
+    }
+    let is_other = |set: &&SetWeight| !leader.members.iter().all(|h| set.members.contains(h));
+    weighing.named_sets().filter(is_other).take(MOST_RIVALS).map(Some).collect()
 }
 
 /// Places as columns: the numbers of each by the names of their fields.
@@ -101,20 +197,20 @@ fn columns<M: Diagnosable>(points: &[M::Point]) -> BTreeMap<String, Vec<Option<f
 }
 
 /// To be expected from what a run adds to the separation; no larger than a number can say.
-pub(super) fn bayes_factor(now: f64, then: f64) -> f64 {
+fn bayes_factor(now: f64, then: f64) -> f64 {
     (0.5 * (then * then - now * now).max(0.0)).min(600.0).exp()
 }
 
-/// Rows in proportion to what a whole run gains: odds grow as exp(d^2/2), d^2 with the number of rows.
-fn rows_needed(gained: f64, rows: usize) -> Option<usize> {
+/// Rows in proportion to what a whole run gains: odds grow as exp(d^2/2), d^2 with the number of rows; and what as many runs as
+/// that takes cost, each with its rows.
+fn settles(gained: f64, rows: usize, [per_run, per_row]: [f64; 2]) -> Option<(usize, f64)> {
     let wanted = 2.0 * SETTLING_ODDS.ln();
-    // Less than a thousandth of what is needed from a whole run will not be had by more of the same.
-    (gained > 1e-3 * wanted).then(|| {
-        let count = (wanted / gained * rows as f64).ceil();
-        // At most a thousand runs, by the bound above.
+    (gained * MOST_RUNS > wanted).then(|| {
+        let runs = wanted / gained;
+        // At most twenty runs, by the bound above.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let count = count as usize;
-        count.max(1)
+        let count = (runs * rows as f64).ceil() as usize;
+        (count.max(1), runs * (per_run + per_row * rows as f64))
     })
 }
 
@@ -124,30 +220,34 @@ fn contenders<'a>(weighing: &'a Weighing<'_>) -> Option<(&'a SetWeight, Option<&
     if matches!(weighing.verdict, Verdict::Adequate) {
         return Some((leader, None));
     }
-    let rival = weighing.named_sets().skip(1).find(|set| !leader.members.iter().all(|h| set.members.contains(h)))?;
+    let rival = rivals(weighing, leader).into_iter().next().flatten()?;
     Some((leader, Some(rival)))
 }
 
 fn separation_with<M: Diagnosable>(
     job: &JobOf<M>,
     rows: &Rows<M::Run, M::Point>,
-    candidate: &NextRun<M::Run, M::Point>,
+    added: &[&Run<M>],
     weighing: &Weighing<'_>,
     sets: [Option<&SetWeight>; 2],
     monitor: &dyn Monitor,
 ) -> Result<Option<f64>, Failure> {
     let mut all = rows.clone();
-    let run = all.runs.len();
-    all.runs.push(candidate.run.clone());
-    all.points.extend(candidate.points.iter().map(|point| (run, point.clone())));
+    let (mut traces, mut runs) = (Vec::new(), Vec::new());
+    for candidate in added {
+        let (run, first) = (all.runs.len(), all.points.len());
+        all.runs.push(candidate.run.clone());
+        all.points.extend(candidate.points.iter().map(|point| (run, point.clone())));
+        traces.push((first..all.points.len()).collect());
+        runs.push(run);
+    }
     // A candidate beyond what the model covers is no candidate.
     let (base, known) = base_of::<M>(job);
     let Ok(prepared) = M::prepare(&base, &all, &job.quantity, monitor) else { return Ok(None) };
     let old = weighing.foundation.data;
-    let first = old.value.len();
     let layout = Layout {
-        traces: old.layout.traces.iter().cloned().chain([(first..all.points.len()).collect()]).collect(),
-        run_of_trace: old.layout.run_of_trace.iter().copied().chain([run]).collect(),
+        traces: old.layout.traces.iter().cloned().chain(traces).collect(),
+        run_of_trace: old.layout.run_of_trace.iter().copied().chain(runs).collect(),
         design: M::design(&prepared),
     };
     let mut noise = weighing.noise.clone();
@@ -187,4 +287,33 @@ fn separation_with<M: Diagnosable>(
     let a = Signature::anew(&bound, &whitener, &keep, &of_leader)?;
     let b = Signature::anew(&bound, &whitener, &keep, &of_rival)?;
     Ok(Some(a.separation(&b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn looked(rows: usize, gained: f64, costs: [f64; 2]) -> (usize, Looked<()>) {
+        let (changes, run, places, bayes_factor) = ("depth_mm", (), BTreeMap::new(), 1.0);
+        let separation_then = gained.sqrt();
+        let settles = settles(gained, rows, costs);
+        (rows, Looked { changes, run, rows, places, separation_then, bayes_factor, settles })
+    }
+
+    #[test]
+    fn the_run_that_settles_at_the_least_cost_is_the_best() {
+        let wanted = 2.0 * SETTLING_ODDS.ln();
+        let best = |costs| cheapest(&[looked(1, 1.0, costs), looked(20, 4.0, costs)]);
+        // A run costs what it costs, whatever is measured of it: the one that parts more.
+        assert_eq!(best([1.0, 0.0]), Some(1));
+        // Rows cost as much as the run: a quarter of the runs with ten times the cost each.
+        assert_eq!(best([1.0, 1.0]), Some(0));
+        let (rows, cost) = looked(20, 4.0, [1.0, 1.0]).1.settles.unwrap_or_default();
+        assert_eq!(rows, (20.0 * wanted / 4.0).ceil() as usize);
+        assert!((cost - 21.0 * wanted / 4.0).abs() < 1e-12);
+        // What settles nothing comes after what does, and among the like what parts more.
+        let nothing = [looked(5, 1e-9, [1.0, 0.0]), looked(5, 0.99 * wanted / MOST_RUNS, [1.0, 0.0])];
+        assert_eq!((nothing[1].1.settles, cheapest(&nothing)), (None, Some(1)));
+        assert_eq!(cheapest::<()>(&[]), None);
+    }
 }

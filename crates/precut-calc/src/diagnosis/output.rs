@@ -556,12 +556,45 @@ pub struct NextReport<R: ToSchema> {
     /// Bayes factor to be expected from this run.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub bayes_factor: f64,
-    /// Rows of this kind that would bring odds of 20 to 1; absent where no number would.
+    /// Rows of this kind that would bring odds of 20 to 1; absent where more than twenty such runs would be needed.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rows_needed: Option<u32>,
+    /// What it costs to bring odds of 20 to 1 with runs of this kind, in the unit of the stated costs; absent where more than twenty would be needed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub cost_to_settle: Option<f64>,
+    /// Runs to measure with it, where several were asked for: fewer where a further one would add nothing.
+    #[serde(default = "Vec::new", skip_serializing_if = "Vec::is_empty")]
+    #[schema(inline)]
+    pub further_runs: Vec<FurtherRun<R>>,
     /// Every run that was looked at, with what it would part.
     #[schema(inline)]
     pub candidates: Vec<CandidateReport<R>>,
+}
+
+/// A run to measure with those before it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(bound(serialize = "R: Serialize", deserialize = "R: Deserialize<'de>"))]
+pub struct FurtherRun<R: ToSchema> {
+    /// The condition that it changes.
+    pub changes: String,
+    /// Its conditions.
+    #[schema(inline)]
+    pub run: R,
+    /// Rows that it would bring.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub rows: u32,
+    /// Where they would be measured: columns by the fields of a measured row, one entry per row.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(extensions(("x-unit" = json!("as the field's name says"))))]
+    pub places: BTreeMap<String, Vec<Option<f64>>>,
+    /// Kinds of the rival that the runs before it part from the leading set least; none for the base.
+    pub rival: Vec<String>,
+    /// Separation of both with the runs before it, sigmas.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_before_sigmas: f64,
+    /// The same with this run measured too.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub separation_then_sigmas: f64,
 }
 
 /// A run that was looked at.
@@ -576,6 +609,9 @@ pub struct CandidateReport<R: ToSchema> {
     /// Separation of leader and rival with this run measured too, sigmas.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub separation_sigmas: f64,
+    /// What it costs to bring odds of 20 to 1 with runs of this kind; absent where more than twenty would be needed.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub cost_to_settle: Option<f64>,
     /// Bayes factor to be expected from this run.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub bayes_factor: f64,

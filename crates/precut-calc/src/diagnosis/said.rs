@@ -58,6 +58,8 @@ pub(super) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_gain",
     "diagnosis_class_gain",
     "diagnosis_next",
+    "diagnosis_next_further",
+    "diagnosis_next_none",
     "diagnosis_negligible",
     "diagnosis_several_values",
     "diagnosis_changed",
@@ -285,6 +287,12 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
                 .with("now", next.separation_now_sigmas)
                 .with("then", next.separation_then_sigmas),
         );
+        let further: Vec<String> = next.further_runs.iter().map(|run| run.changes.clone()).collect();
+        if !further.is_empty() {
+            said.push(Message::new("diagnosis_next_further").with("changes", further));
+        }
+    } else if output.verdict == VerdictClass::Confounded {
+        said.push(Message::new("diagnosis_next_none"));
     }
     said.extend(extended(output, quantity));
     if let Some(gain) = &output.gain {

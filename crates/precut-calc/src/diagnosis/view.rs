@@ -4,11 +4,11 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::gain::Gain;
 use super::identify::{Signature, separations};
-use super::next::{NextMeasurement, bayes_factor};
+use super::next::NextMeasurement;
 use super::optima::{Peak, mixture_interval};
 use super::outlying::OutlyingRun;
 use super::output::{
-    CandidateReport, CauseReport, ContributionReport, LikelySet, NamedCause, NextReport, OutlyingRunReport,
+    CandidateReport, CauseReport, ContributionReport, FurtherRun, LikelySet, NamedCause, NextReport, OutlyingRunReport,
     ParameterReport, ProfileReport, SeparationReport, SetReport, SignatureReport, VerdictClass,
 };
 use super::profile::Profile;
@@ -281,25 +281,38 @@ impl<'a> View<'a> {
     pub(super) fn next_report<R: utoipa::ToSchema>(&self, next: NextMeasurement<R>) -> NextReport<R> {
         let kinds = |members: &[usize]| members.iter().map(|&h| self.kind(h).to_owned()).collect();
         let count = |rows: usize| u32::try_from(rows).unwrap_or(u32::MAX);
+        let further = next.further.into_iter().map(|own| FurtherRun {
+            changes: own.looked.changes.to_owned(),
+            run: own.looked.run,
+            rows: count(own.looked.rows),
+            places: own.looked.places,
+            rival: kinds(&own.rival),
+            separation_before_sigmas: own.separation_before,
+            separation_then_sigmas: own.looked.separation_then,
+        });
+        let best = next.best;
         NextReport {
-            changes: next.changes.to_owned(),
-            run: next.run,
-            rows: count(next.rows),
-            places: next.places,
+            changes: best.changes.to_owned(),
+            run: best.run,
+            rows: count(best.rows),
+            places: best.places,
             leader: kinds(&next.leader),
             rival: kinds(&next.rival),
             separation_now_sigmas: next.separation_now,
-            separation_then_sigmas: next.separation_then,
-            bayes_factor: next.bayes_factor,
-            rows_needed: next.rows_needed.map(count),
+            separation_then_sigmas: best.separation_then,
+            bayes_factor: best.bayes_factor,
+            rows_needed: best.settles.map(|(rows, _)| count(rows)),
+            cost_to_settle: best.settles.map(|(_, cost)| cost),
+            further_runs: further.collect(),
             candidates: next
                 .candidates
                 .into_iter()
-                .map(|(changes, run, separation)| CandidateReport {
-                    changes: changes.to_owned(),
-                    run,
-                    separation_sigmas: separation,
-                    bayes_factor: bayes_factor(next.separation_now, separation),
+                .map(|own| CandidateReport {
+                    changes: own.changes.to_owned(),
+                    run: own.run,
+                    separation_sigmas: own.separation_then,
+                    cost_to_settle: own.settles.map(|(_, cost)| cost),
+                    bayes_factor: own.bayes_factor,
                 })
                 .collect(),
         }
