@@ -175,12 +175,10 @@ fn model(parts: &[KeptPart], known: &[(&'static str, &'static str, &'static str)
             },
             Item::Line { name: kind, x, y: told.iter().map(|(_, size)| Some(size.delta)).collect(), role: Role::After },
         ];
-        match panels.last_mut().filter(|(last, _)| *last == which) {
-            Some((_, panel)) => panel.items.extend(items),
-            None => {
-                let y = Axis::linear(parameter, unit);
-                panels.push((which, Panel { y, height: 1.0, items: items.to_vec() }));
-            }
+        if let Some((_, panel)) = panels.last_mut().filter(|(last, _)| *last == which) {
+            panel.items.extend(items);
+        } else {
+            panels.push((which, Panel { y: Axis::linear(parameter, unit), height: 1.0, items: items.to_vec() }));
         }
     }
     let panels: Vec<Panel> = panels.into_iter().map(|(_, panel)| panel).collect();

@@ -41,6 +41,8 @@ pub struct NextMeasurement<R> {
 /// A run that was looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Looked<R> {
+    /// Its place among those that could be made.
+    pub number: usize,
     /// The condition that it changes.
     pub changes: &'static str,
     /// Its conditions.
@@ -85,23 +87,17 @@ pub(super) fn next_measurement<M: Diagnosable>(
     let separation_now = now.separation(&other);
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
     let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges));
-    let mut looked = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
-    let Some(best) = cheapest(&looked) else { return Ok(None) };
-    let first = looked[best].0;
-    let candidates: Vec<Looked<M::Run>> = looked.drain(..).map(|(_, looked)| looked).collect();
-    let best = candidates[best].clone();
-    let further = if best.settles.is_some() { planning.further(&runs, first, leader)? } else { Vec::new() };
+    let candidates = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
+    let Some(best) = cheapest(&candidates).cloned() else { return Ok(None) };
+    let further = if best.settles.is_some() { planning.further(&runs, best.number, leader)? } else { Vec::new() };
     let rival = rival.map_or_else(Vec::new, |rival| rival.members.clone());
     Ok(Some(NextMeasurement { best, separation_now, leader: leader.members.clone(), rival, further, candidates }))
 }
 
 /// The one with which the question is settled at the least cost; where none settles it, that which parts most.
-fn cheapest<R>(looked: &[(usize, Looked<R>)]) -> Option<usize> {
+fn cheapest<R>(looked: &[Looked<R>]) -> Option<&Looked<R>> {
     let cost = |own: &Looked<R>| own.settles.map_or(f64::INFINITY, |(_, cost)| cost);
-    (0..looked.len()).min_by(|&a, &b| {
-        let (a, b) = (&looked[a].1, &looked[b].1);
-        cost(a).total_cmp(&cost(b)).then(b.separation_then.total_cmp(&a.separation_then))
-    })
+    looked.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)).then(b.separation_then.total_cmp(&a.separation_then)))
 }
 
 /// What further runs are planned with.
@@ -122,7 +118,7 @@ impl<M: Diagnosable> Planning<'_, M> {
         before: &[&Run<M>],
         sets: [Option<&SetWeight>; 2],
         separation_before: f64,
-    ) -> Result<Vec<(usize, Looked<M::Run>)>, Failure> {
+    ) -> Result<Vec<Looked<M::Run>>, Failure> {
         let mut all = Vec::new();
         for (number, candidate) in runs.iter().enumerate() {
             checkpoint(self.monitor)?;
@@ -134,7 +130,8 @@ impl<M: Diagnosable> Planning<'_, M> {
             let rows = candidate.points.len();
             let gained = separation_then * separation_then - separation_before * separation_before;
             let options = &self.job.options;
-            let looked = Looked {
+            all.push(Looked {
+                number,
                 changes: candidate.changes,
                 run: candidate.run.clone(),
                 rows,
@@ -142,8 +139,7 @@ impl<M: Diagnosable> Planning<'_, M> {
                 separation_then,
                 bayes_factor: bayes_factor(separation_before, separation_then),
                 settles: settles(gained, rows, [options.cost_per_run, options.cost_per_row]),
-            };
-            all.push((number, looked));
+            });
         }
         Ok(all)
     }
@@ -164,9 +160,8 @@ impl<M: Diagnosable> Planning<'_, M> {
             }
             let Some((separation_before, rival)) = least else { break };
             let looked = self.looked_at(runs, &chosen, [Some(leader), rival], separation_before)?;
-            let Some(best) = cheapest(&looked).filter(|&best| looked[best].1.settles.is_some()) else { break };
-            let (number, looked) = looked[best].clone();
-            chosen.push(&runs[number]);
+            let Some(looked) = cheapest(&looked).filter(|best| best.settles.is_some()).cloned() else { break };
+            chosen.push(&runs[looked.number]);
             let rival = rival.map_or_else(Vec::new, |rival| rival.members.clone());
             further.push(Further { looked, rival, separation_before });
         }
@@ -210,7 +205,8 @@ fn settles(gained: f64, rows: usize, [per_run, per_row]: [f64; 2]) -> Option<(us
         // At most twenty runs, by the bound above.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let count = (runs * rows as f64).ceil() as usize;
-        (count.max(1), runs * (per_run + per_row * rows as f64))
+        // No run is cut in part.
+        (count.max(1), runs.max(1.0) * (per_run + per_row * rows as f64))
     })
 }
 
@@ -290,30 +286,39 @@ fn separation_with<M: Diagnosable>(
 }
 
 #[cfg(test)]
+#[allow(clippy::panic, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 mod tests {
     use super::*;
 
-    fn looked(rows: usize, gained: f64, costs: [f64; 2]) -> (usize, Looked<()>) {
+    fn looked(number: usize, rows: usize, gained: f64, costs: [f64; 2]) -> Looked<()> {
         let (changes, run, places, bayes_factor) = ("depth_mm", (), BTreeMap::new(), 1.0);
         let separation_then = gained.sqrt();
         let settles = settles(gained, rows, costs);
-        (rows, Looked { changes, run, rows, places, separation_then, bayes_factor, settles })
+        Looked { number, changes, run, rows, places, separation_then, bayes_factor, settles }
+    }
+
+    fn best(rows_and_gains: [(usize, f64); 2], costs: [f64; 2]) -> Looked<()> {
+        let both = [0, 1].map(|k| looked(k, rows_and_gains[k].0, rows_and_gains[k].1, costs));
+        cheapest(&both).cloned().unwrap_or_else(|| panic!("one of two is the cheapest"))
     }
 
     #[test]
     fn the_run_that_settles_at_the_least_cost_is_the_best() {
         let wanted = 2.0 * SETTLING_ODDS.ln();
-        let best = |costs| cheapest(&[looked(1, 1.0, costs), looked(20, 4.0, costs)]);
+        let two = [(1, 1.0), (20, 4.0)];
         // A run costs what it costs, whatever is measured of it: the one that parts more.
-        assert_eq!(best([1.0, 0.0]), Some(1));
+        assert_eq!(best(two, [1.0, 0.0]).number, 1);
         // Rows cost as much as the run: a quarter of the runs with ten times the cost each.
-        assert_eq!(best([1.0, 1.0]), Some(0));
-        let (rows, cost) = looked(20, 4.0, [1.0, 1.0]).1.settles.unwrap_or_default();
+        assert_eq!(best(two, [1.0, 1.0]).number, 0);
+        let (rows, cost) = looked(0, 20, 4.0, [1.0, 1.0]).settles.unwrap_or_default();
         assert_eq!(rows, (20.0 * wanted / 4.0).ceil() as usize);
         assert!((cost - 21.0 * wanted / 4.0).abs() < 1e-12);
+        // One run at least has to be made; among those of which one will do, the one that parts more.
+        let enough = best([(4, 2.0 * wanted), (4, 4.0 * wanted)], [3.0, 0.5]);
+        assert_eq!((enough.number, enough.settles), (1, Some((1, 5.0))));
         // What settles nothing comes after what does, and among the like what parts more.
-        let nothing = [looked(5, 1e-9, [1.0, 0.0]), looked(5, 0.99 * wanted / MOST_RUNS, [1.0, 0.0])];
-        assert_eq!((nothing[1].1.settles, cheapest(&nothing)), (None, Some(1)));
+        let nothing = best([(5, 1e-9), (5, 0.99 * wanted / MOST_RUNS)], [1.0, 0.0]);
+        assert_eq!((nothing.number, nothing.settles), (1, None));
         assert_eq!(cheapest::<()>(&[]), None);
     }
 }

@@ -277,23 +277,7 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
     }
     said.extend(output.named.iter().flat_map(changed));
     said.extend(output.named.iter().filter_map(several_values));
-    // A run that parts nothing is not worth a sentence.
-    if let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) {
-        said.push(
-            Message::new("diagnosis_next")
-                .with("changes", next.changes.clone())
-                .with("leader", next.leader.clone())
-                .with("rival", next.rival.clone())
-                .with("now", next.separation_now_sigmas)
-                .with("then", next.separation_then_sigmas),
-        );
-        let further: Vec<String> = next.further_runs.iter().map(|run| run.changes.clone()).collect();
-        if !further.is_empty() {
-            said.push(Message::new("diagnosis_next_further").with("changes", further));
-        }
-    } else if output.verdict == VerdictClass::Confounded {
-        said.push(Message::new("diagnosis_next_none"));
-    }
+    said.extend(next_runs(output));
     said.extend(extended(output, quantity));
     if let Some(gain) = &output.gain {
         said.push(
@@ -319,6 +303,27 @@ pub(super) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema>(
             .with("low", downstream.extended.interval_95[0])
             .with("high", downstream.extended.interval_95[1])
     }));
+    said
+}
+
+/// What to measure next, or that nothing would help.
+fn next_runs<E: utoipa::ToSchema, R: utoipa::ToSchema>(output: &DiagnosisResult<E, R>) -> Vec<Message> {
+    let Some(next) = output.next_measurement.as_ref().filter(|next| next.rows_needed.is_some()) else {
+        let is_open = output.verdict == VerdictClass::Confounded;
+        return is_open.then(|| Message::new("diagnosis_next_none")).into_iter().collect();
+    };
+    let mut said = vec![
+        Message::new("diagnosis_next")
+            .with("changes", next.changes.clone())
+            .with("leader", next.leader.clone())
+            .with("rival", next.rival.clone())
+            .with("now", next.separation_now_sigmas)
+            .with("then", next.separation_then_sigmas),
+    ];
+    let further: Vec<String> = next.further_runs.iter().map(|run| run.changes.clone()).collect();
+    if !further.is_empty() {
+        said.push(Message::new("diagnosis_next_further").with("changes", further));
+    }
     said
 }
 
