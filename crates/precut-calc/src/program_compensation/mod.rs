@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 6,
+        version: 7,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \

@@ -42,6 +42,7 @@ pub(crate) const WARNING_CODES: &[&str] = &[
     "left_alone",
     "rapid_close",
     "gouge",
+    "edge_too_short",
     "blank_below_contour",
 ];
 
@@ -309,5 +310,8 @@ pub(crate) fn warnings(
     let gouges = turned.gouges.iter().take(MOST_LINES).map(|(line, [falls_deg, edge_deg])| {
         Finding::new("gouge", "/nc_program").measured(*falls_deg, *edge_deg, "deg").with("line", *line)
     });
-    doubt.into_iter().chain(rapid).chain(hits).chain(gouges).collect()
+    let short = turned.beyond_edge.iter().take(MOST_LINES).map(|(line, [beyond_mm, length_mm])| {
+        Finding::new("edge_too_short", "/nc_program").measured(*beyond_mm, *length_mm, "mm").with("line", *line)
+    });
+    doubt.into_iter().chain(rapid).chain(hits).chain(gouges).chain(short).collect()
 }

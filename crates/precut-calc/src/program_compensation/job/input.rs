@@ -264,6 +264,11 @@ pub struct ProgramTool {
     /// tailstock and axis (a left-hand tool), 8 the lowest point, 0 and 9 the centre of the nose.
     #[schema(minimum = 0, maximum = 9, example = 3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("T"))))]
     pub tip_direction: u8,
+    /// Length of its edges from the corner that they would have without a nose, as in ISO 1832. With it a cut that goes on beyond
+    /// the end of the edge is told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.1, maximum = 1000.0, example = 12.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l")), ("x-advanced" = json!(true))))]
+    pub edge_length_mm: Option<f64>,
 }
 
 /// How a control reads what a program does not say.

@@ -8,6 +8,7 @@ use super::super::super::job::{Job, KeepOut, ProgramStock, ProgramTool, StockRow
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
+use super::edges::EdgeEnds;
 use super::sweep::{Shape, Way};
 
 /// Why a program is not driven over its blank.
@@ -15,6 +16,8 @@ pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_n
 
 /// Lines that own so much of the surface finish, mm.
 pub(crate) const FINISHES_MM: f64 = 0.3;
+/// What stands above the end of an edge by less is not told, mm.
+const BEYOND_EDGE_MM: f64 = 0.01;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
 /// Multiplications of a move, and of it against a part of the outline, about.
@@ -34,6 +37,9 @@ pub(crate) struct Turned {
     pub(crate) hits: Vec<Hit>,
     /// Lines on which the trailing edge cuts into what the tip has left: how steep the way falls there, and that edge, deg.
     pub(crate) gouges: BTreeMap<usize, [f64; 2]>,
+    /// Lines whose cut goes on beyond the end of the edge: by how much the stock stands above that at the most, and the length
+    /// of the edge, mm.
+    pub(crate) beyond_edge: BTreeMap<usize, [f64; 2]>,
     /// Whether anything is cut.
     pub(crate) cuts: bool,
     /// The first cut along the axis: across it a cut may well be as deep as the work is thick.
@@ -232,6 +238,7 @@ pub(crate) fn turned(
         in_stock: Vec::new(),
         hits: Vec::new(),
         gouges: BTreeMap::new(),
+        beyond_edge: BTreeMap::new(),
         cuts: false,
         first_cut: None,
     };
@@ -253,6 +260,13 @@ pub(crate) fn turned(
                 turned.in_stock.push(InStock { line: one.line, depth_mm });
             }
         } else if one.kind.is_feed() {
+            if let Some((ends, length_mm)) = EdgeEnds::of(tool, &shape).zip(tool.edge_length_mm) {
+                let beyond_mm = ends.beyond_mm(tool.tip_direction, &shape, &way, &mut chain);
+                if beyond_mm > BEYOND_EDGE_MM {
+                    let told = turned.beyond_edge.entry(one.line).or_insert([0.0, length_mm]);
+                    told[0] = told[0].max(beyond_mm);
+                }
+            }
             let depth_mm = chain.turn(&shape, &way, one.line);
             if depth_mm > CONTACT_MM {
                 if let Some(steepest) = shape.falls_behind(&way, tool.tip_direction == 4) {

@@ -112,7 +112,7 @@ const ARC_SHARES: u32 = 36;
 const ACROSS: f64 = 1e-6;
 const SAME_SLOPE: f64 = 1e-9;
 /// An edge goes on as far as there is work, mm.
-const FAR_MM: f64 = 1e6;
+pub(super) const FAR_MM: f64 = 1e6;
 
 impl Shape {
     /// Unit normal below the nose where its slope is this: along x and r.
