@@ -202,13 +202,14 @@ pub(crate) fn blank_below(
         (to[1] - from[1]).abs() <= ALONG * (to[0] - from[0]).abs()
     };
     let mut found: Vec<([f64; 2], f64, usize)> = Vec::new();
+    let blanks: Vec<_> = turned.parts.iter().filter(|(_, owner)| owner.is_none()).map(|(blank, _)| blank).collect();
     for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
         let line = stroke.one.line;
         let Some(meant) = stroke.shape.line(&stroke.way).filter(|_| is_along(&stroke.way)) else { continue };
         if finishing.binary_search(&line).is_err() {
             continue;
         }
-        for (blank, _) in turned.parts.iter().filter(|(_, owner)| owner.is_none()) {
+        for blank in &blanks {
             let ends = [blank.x0.max(meant.x0), blank.x1.min(meant.x1)];
             let low_mm = ends.map(|x| meant.curve.at(x) - blank.curve.at(x)).into_iter().fold(f64::INFINITY, f64::min);
             if ends[1] - ends[0] > FINISHES_MM && low_mm > LOW_MM {

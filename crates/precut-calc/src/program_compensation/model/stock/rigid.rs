@@ -9,7 +9,7 @@ use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
 use super::edges::EdgeEnds;
-use super::sweep::{Shape, Way};
+use super::sweep::{Shape, Swept, Way};
 
 /// Why a program is not driven over its blank.
 pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
@@ -314,6 +314,24 @@ impl Chain {
         let swept = shape.sweep(way);
         // All of it in the work as it is before.
         let deepest = swept.pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max);
+        self.take_away(&swept, owner);
+        deepest
+    }
+
+    /// Cuts along a way, and does not say how deep.
+    pub(crate) fn cut_along(&mut self, shape: &Shape, way: &Way, owner: usize) {
+        self.take_away(&shape.sweep(way), owner);
+    }
+
+    /// Cuts along straight ways that follow each other.
+    pub(crate) fn cut_along_all(&mut self, shape: &Shape, ways: &[Way], owner: usize) {
+        match shape.sweep_all(ways) {
+            Some(swept) => self.take_away(&swept, owner),
+            None => ways.iter().for_each(|way| self.cut_along(shape, way, owner)),
+        }
+    }
+
+    fn take_away(&mut self, swept: &Swept, owner: usize) {
         for piece in &swept.pieces {
             for above in above_axis(piece) {
                 self.cut(&above, owner);
@@ -322,7 +340,6 @@ impl Chain {
         for &[x, from] in &swept.walls {
             self.touch_wall(x, from, owner);
         }
-        deepest
     }
 }
 

@@ -168,6 +168,44 @@ impl Shape {
         swept
     }
 
+    /// What straight ways leave that follow each other along the axis, one way of it: what no place of them makes alone is left out. None
+    /// where a way turns back or is steeper than an edge.
+    pub(crate) fn sweep_all(&self, ways: &[Way]) -> Option<Swept> {
+        let line = |way: &Way| match *way {
+            Way::Line(from, to) => Some([from, to]),
+            Way::Arc { .. } => None,
+        };
+        let mut lines: Vec<[[f64; 2]; 2]> = ways.iter().map(line).collect::<Option<_>>()?;
+        if lines.first().is_some_and(|[from, to]| from[0] > to[0]) {
+            lines.reverse();
+            for ends in &mut lines {
+                ends.reverse();
+            }
+        }
+        let slope = |[from, to]: &[[f64; 2]; 2]| (to[1] - from[1]) / (to[0] - from[0]);
+        let is_smooth = lines.iter().all(|ends| ends[1][0] > ends[0][0] && self.has_slope(slope(ends)));
+        let ends = lines.first().zip(lines.last()).filter(|_| is_smooth)?;
+        let mut swept = Swept::default();
+        self.stand(ends.0[0], &mut swept);
+        self.stand(ends.1[1], &mut swept);
+        swept.pieces.extend(lines.iter().filter_map(|[from, to]| self.line(&Way::Line(*from, *to))));
+        // Between two lines of which the second one rises more, the nose makes what lies between.
+        for pair in lines.windows(2) {
+            let slopes = [slope(&pair[0]), slope(&pair[1])];
+            if self.nose > 0.0 && slopes[0] < slopes[1] {
+                let [x, r] = pair[1][0];
+                let (cx, cr) = (x + self.centre[0], r + self.centre[1]);
+                let [x0, x1] = slopes.map(|slope| cx + self.nose * Self::below(slope)[0]);
+                swept.pieces.push(Piece {
+                    x0,
+                    x1,
+                    curve: Curve::Arc { x: cx, r: cr, radius: self.nose, is_upper: false },
+                });
+            }
+        }
+        Some(swept)
+    }
+
     /// From the programmed point to what cuts where the slope is this.
     fn support(&self, slope: f64) -> [f64; 2] {
         let below = Self::below(slope);

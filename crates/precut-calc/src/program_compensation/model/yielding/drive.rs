@@ -129,12 +129,8 @@ impl Meant {
     fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
         self.before.clone_from(&self.after);
         match bends_as.and_then(|ways| ways.get(&stroke.index)) {
-            Some(ways) => ways.iter().for_each(|(shape, way)| {
-                self.after.turn(shape, way, stroke.one.line);
-            }),
-            None => {
-                self.after.turn(&stroke.shape, &stroke.way, stroke.one.line);
-            }
+            Some(ways) => ways.iter().for_each(|(shape, way)| self.after.cut_along(shape, way, stroke.one.line)),
+            None => self.after.cut_along(&stroke.shape, &stroke.way, stroke.one.line),
         }
     }
 }
@@ -221,15 +217,13 @@ pub(crate) fn yielding(
         let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
         if is_corrected {
-            real.turn(shape, way, one.line);
+            real.cut_along(shape, way, one.line);
         } else {
             let lifted: Vec<Way> = places
                 .windows(2)
                 .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
                 .collect();
-            for way in &lifted {
-                real.turn(shape, way, one.line);
-            }
+            real.cut_along_all(shape, &lifted, one.line);
         }
         if !driven.corrected.is_empty() {
             let is_end = |place: &CutPlace| place.share <= 0.0 || place.share >= 1.0;
