@@ -99,6 +99,7 @@ mod process_support;
 mod process_watch;
 mod program_correction;
 mod program_fuzz;
+mod program_keep_out;
 mod program_reading;
 mod program_refeed;
 mod program_stock;

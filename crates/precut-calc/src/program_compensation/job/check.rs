@@ -48,6 +48,12 @@ impl Check for Job {
                     .measured(keep_out.z_end_mm, keep_out.z_start_mm, "mm")
                     .with("above", keep_out.z_start_mm)
             });
+            let count = self.supports.len() as f64;
+            violations.require(keep_out.support.is_none_or(|support| f64::from(support) < count), || {
+                Finding::new("no_such_support", format!("/keep_out/{i}/support"))
+                    .measured(keep_out.support.map_or(0.0, f64::from), count, "1")
+                    .with("below", count)
+            });
         }
         violations.require(self.drawing.is_empty() || self.stock.is_some(), || {
             Finding::new("drawing_without_stock", "/stock")

@@ -87,6 +87,14 @@ pub struct Job {
 }
 
 impl Job {
+    /// Whether a support acts in a line of the program.
+    pub(crate) fn acts(&self, support: u32, line: usize) -> bool {
+        let mut told = self.support_lines.iter().filter(|told| told.support == support);
+        told.all(|told| {
+            told.from_line.is_none_or(|from| from as usize <= line) && told.to_line.is_none_or(|to| line <= to as usize)
+        })
+    }
+
     /// What holds the blank and what pushes it, where the job says by which forces.
     pub(crate) fn holding(&self) -> Option<Holding> {
         let (stock, force) = self.stock.as_ref().zip(self.force.as_ref())?;
@@ -171,6 +179,11 @@ pub struct KeepOut {
     /// Diameter.
     #[schema(minimum = 0.01, maximum = 10_000.0, example = 120.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D"))))]
     pub diameter_mm: f64,
+    /// The support that it belongs to, by its place in `supports`, from 0: it stands there in the lines in which that acts. Left out,
+    /// it always does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0, maximum = 7, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("i"))))]
+    pub support: Option<u32>,
 }
 
 /// The blank.
@@ -265,7 +278,7 @@ pub struct ProgramTool {
     #[schema(minimum = 0, maximum = 9, example = 3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("T"))))]
     pub tip_direction: u8,
     /// Length of its edges from the corner that they would have without a nose, as in ISO 1832. With it a cut that goes on beyond
-    /// the end of the edge is told.
+    /// the end of the edge is told, and the tool comes into a place of `keep_out` no farther than its edges reach.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.1, maximum = 1000.0, example = 12.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l")), ("x-advanced" = json!(true))))]
     pub edge_length_mm: Option<f64>,

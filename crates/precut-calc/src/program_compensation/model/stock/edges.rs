@@ -34,6 +34,19 @@ impl EdgeEnds {
         Some(Self([end(-1.0, left), end(1.0, right)]))
     }
 
+    /// What a tool covers on its way that ends where its edges do, as pieces of which the lowest counts. Where a way is steeper than an
+    /// edge, that counts as far as any place of the way brings it.
+    pub(crate) fn covered(&self, shape: &Shape, way: &Way) -> Vec<Piece> {
+        let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+        for point in self.0.into_iter().chain(shape.sides()) {
+            for (path, _) in path_of(way, point) {
+                (low, high) = (low.min(path.x0), high.max(path.x1));
+            }
+        }
+        let clipped = |piece: Piece| Piece { x0: piece.x0.max(low), x1: piece.x1.min(high), ..piece };
+        shape.sweep(way).pieces.into_iter().map(clipped).filter(|piece| piece.x1 > piece.x0).collect()
+    }
+
     /// How high stock stands above the end of the edge that leads along a way, mm; below 0 it stays clear.
     pub(crate) fn beyond_mm(&self, tip_direction: u8, shape: &Shape, way: &Way, stock: &mut Chain) -> f64 {
         let mut highest = f64::NEG_INFINITY;

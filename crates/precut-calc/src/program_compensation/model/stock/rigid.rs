@@ -242,12 +242,16 @@ pub(crate) fn turned(
         cuts: false,
         first_cut: None,
     };
-    let mut kept_out: Vec<Chain> = job.keep_out.iter().map(cylinder).collect();
+    let mut kept_out: Vec<(Chain, Option<u32>)> =
+        job.keep_out.iter().map(|keep_out| (cylinder(keep_out), keep_out.support)).collect();
     let mut pace = Pace::new(monitor);
-    for Stroke { one, tool, shape, way, .. } in strokes(program, job, zero) {
+    for Stroke { index, one, tool, shape, way } in strokes(program, job, zero) {
         pace.work(WORK_OF_MOVE * (1 + kept_out.len()) + chain.take_looked_at() * WORK_OF_PART)?;
-        for (place, kept_out) in kept_out.iter_mut().enumerate() {
-            let depth_mm = kept_out.depth_of(&shape, &way);
+        for (place, (kept_out, support)) in kept_out.iter_mut().enumerate() {
+            if support.is_some_and(|support| !job.acts(support, program.executed_at(index))) {
+                continue;
+            }
+            let depth_mm = kept_out.depth_of_tool(tool, &shape, &way);
             let is_told = turned.hits.iter().rev().take_while(|hit| hit.line == one.line).any(|hit| hit.place == place);
             if depth_mm > CONTACT_MM && !is_told {
                 turned.hits.push(Hit { line: one.line, place, depth_mm });
@@ -307,6 +311,17 @@ impl Chain {
     /// How deep a way lies in the work, mm; below 0 it stays clear.
     pub(crate) fn depth_of(&mut self, shape: &Shape, way: &Way) -> f64 {
         shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The same of a tool that ends where its edges do, where it says how long these are.
+    fn depth_of_tool(&mut self, tool: &ProgramTool, shape: &Shape, way: &Way) -> f64 {
+        match EdgeEnds::of(tool, shape) {
+            None => self.depth_of(shape, way),
+            Some(ends) => {
+                let covered = ends.covered(shape, way);
+                covered.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
     }
 
     /// Cuts along a way; how deep the tool went.

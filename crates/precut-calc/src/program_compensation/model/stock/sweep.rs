@@ -126,6 +126,12 @@ impl Shape {
         self.nose * edge.map_or(1.0, |slope| Self::below(slope)[0])
     }
 
+    /// Both ends of the nose from the programmed point, at the height of its centre, mm.
+    pub(super) fn sides(&self) -> [[f64; 2]; 2] {
+        let [x, r] = self.centre;
+        [[x - self.reach(self.left), r], [x + self.reach(self.right), r]]
+    }
+
     fn has_slope(&self, slope: f64) -> bool {
         self.left.is_none_or(|left| slope > -left) && self.right.is_none_or(|right| slope < right)
     }

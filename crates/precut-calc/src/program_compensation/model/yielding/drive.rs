@@ -315,13 +315,7 @@ fn refused(code: &'static str, line: usize) -> Failure {
 
 /// Which of the supports act in a line.
 fn acts(job: &Job, line: usize) -> Vec<bool> {
-    let is_there = |i: usize| {
-        let mut told = job.support_lines.iter().filter(|told| told.support as usize == i);
-        told.all(|told| {
-            told.from_line.is_none_or(|from| from as usize <= line) && told.to_line.is_none_or(|to| line <= to as usize)
-        })
-    };
-    (0..job.supports.len()).map(is_there).collect()
+    (0_u32..).zip(&job.supports).map(|(support, _)| job.acts(support, line)).collect()
 }
 
 fn direction(way: &Way) -> FeedDirection {
