@@ -98,6 +98,7 @@ mod process_streams;
 mod process_support;
 mod process_watch;
 mod program_correction;
+mod program_drawing;
 mod program_fuzz;
 mod program_keep_out;
 mod program_reading;

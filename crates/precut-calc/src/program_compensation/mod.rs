@@ -12,8 +12,8 @@ pub use answer::output::{
     Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
 };
 pub use job::{
-    DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
-    ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
+    CorrectTo, DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart,
+    ProgramStock, ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
@@ -158,7 +158,8 @@ impl Calculator for ProgramCompensation {
             (turned.as_ref(), yielded.as_ref()),
             (corrected.as_ref(), refed.as_ref()),
         );
-        let explanation = advice::explanation(&output);
+        warnings.extend(advice::far_from_drawing(&output, job.mode.correct_to));
+        let explanation = advice::explanation(&output, job.mode.correct_to);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
     }

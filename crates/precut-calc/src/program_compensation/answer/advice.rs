@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::calculator::{Finding, Message};
 
-use super::super::job::{Job, ProgramStock};
+use super::super::job::{CorrectTo, Job, ProgramStock};
 use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::reader::{Kind, Nose, Program};
 use super::super::model::stock::{Doubt, FINISHES_MM, Stroke, Turned, Way, implausible_mm, strokes};
-use super::super::model::yielding::{CLOSE_MM, CutMove, PlaceOfMove, Yielded};
+use super::super::model::yielding::{CLOSE_MM, CutMove, FARTHEST_MM, PlaceOfMove, Yielded};
 use super::output::{CompensatedProgram, Outcome, RefedProgram};
 use crate::force::{ForceModel, Reached, ReachedCut};
 
@@ -43,6 +43,7 @@ pub(crate) const WARNING_CODES: &[&str] = &[
     "rapid_close",
     "gouge",
     "edge_too_short",
+    "far_from_drawing",
     "blank_below_contour",
 ];
 
@@ -53,7 +54,9 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "stretches_passed",
     "surface_left",
     "program_off_drawing",
+    "program_brought_to_drawing",
     "error_along_contour",
+    "error_against_drawing",
     "program_corrected",
     "program_refed",
     "refeed_price",
@@ -61,7 +64,8 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "nothing_to_correct",
 ];
 
-pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
+pub(crate) fn explanation(outcome: &Outcome, correct_to: CorrectTo) -> Vec<Message> {
+    let is_to_drawing = correct_to == CorrectTo::Drawing;
     let mut said = vec![
         Message::new("program_read")
             .with("lines", outcome.lines)
@@ -82,14 +86,14 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     if let Some(drawing) = &outcome.drawing
         && let Some(largest) = drawing.program_error_um.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))
     {
-        said.push(Message::new("program_off_drawing").with("largest_um", largest));
+        let code = if is_to_drawing { "program_brought_to_drawing" } else { "program_off_drawing" };
+        said.push(Message::new(code).with("largest_um", largest));
     }
     if let Some(yielding) = &outcome.yielding
         && let Some((smallest, largest)) = yielding.smallest_error_um.zip(yielding.largest_error_um)
     {
-        said.push(
-            Message::new("error_along_contour").with("smallest_error_um", smallest).with("largest_error_um", largest),
-        );
+        let code = if is_to_drawing { "error_against_drawing" } else { "error_along_contour" };
+        said.push(Message::new(code).with("smallest_error_um", smallest).with("largest_error_um", largest));
     }
     // What was asked for comes first.
     if let Some(compensation) = &outcome.compensation {
@@ -149,6 +153,17 @@ pub(crate) fn of_corrected(corrected: &Corrected) -> Vec<Finding> {
         corrected.left_alone.iter().filter(is_told).map(|left| left.line).take(MOST_LINES).collect();
     let left = (!lines.is_empty()).then(|| Finding::new("left_alone", "/nc_program").with("lines", lines));
     undersize.chain(left).collect()
+}
+
+/// Lines that finish farther off the drawing than the work is corrected to it.
+pub(crate) fn far_from_drawing(outcome: &Outcome, correct_to: CorrectTo) -> Option<Finding> {
+    let drawing = outcome.drawing.as_ref().filter(|_| correct_to == CorrectTo::Drawing)?;
+    let off = drawing.line.iter().zip(&drawing.program_error_um);
+    let far = |(&line, off_um): (&usize, &f64)| (off_um.abs() > 2e3 * FARTHEST_MM).then_some(line);
+    let lines: BTreeSet<usize> = off.filter_map(far).collect();
+    let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
+    let finding = Finding::new("far_from_drawing", "/drawing").with("limit_mm", 2.0 * FARTHEST_MM);
+    (!lines.is_empty()).then(|| finding.with("lines", lines))
 }
 
 /// Lines that cut in another direction than the force law was measured in.

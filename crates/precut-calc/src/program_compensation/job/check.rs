@@ -4,7 +4,7 @@ use crate::calculator::{Check, Finding, Violations};
 use crate::machinability::ModelForm;
 use crate::material;
 
-use super::input::{Job, ModeKind};
+use super::input::{CorrectTo, Job, ModeKind};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &[
@@ -25,6 +25,7 @@ pub(crate) const CODES: &[&str] = &[
     "keep_out_without_length",
     "keep_out_without_stock",
     "drawing_without_stock",
+    "drawing_missing",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -57,6 +58,9 @@ impl Check for Job {
         }
         violations.require(self.drawing.is_empty() || self.stock.is_some(), || {
             Finding::new("drawing_without_stock", "/stock")
+        });
+        violations.require(self.mode.correct_to == CorrectTo::Program || !self.drawing.is_empty(), || {
+            Finding::new("drawing_missing", "/drawing")
         });
         violations.require(self.keep_out.is_empty() || self.stock.is_some(), || {
             Finding::new("keep_out_without_stock", "/stock")

@@ -35,7 +35,7 @@ pub struct Job {
     #[schema(extensions(("x-group" = json!("workpiece"))))]
     pub stock: Option<ProgramStock>,
     /// The part of the drawing from the headstock end; a place twice is a step. With it the answer says how far the program is off it on
-    /// work and machine that do not yield; it is never corrected to it.
+    /// work and machine that do not yield; it is corrected to it where `mode.correct_to` says so.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000, extensions(("x-group" = json!("workpiece")), ("x-advanced" = json!(true))))]
     pub drawing: Vec<StockRow>,
@@ -430,6 +430,21 @@ pub struct Mode {
     #[serde(default)]
     #[schema(default = false, example = false, extensions(("x-advanced" = json!(true))))]
     pub stamp: bool,
+    /// What the work is corrected to.
+    #[serde(default)]
+    #[schema(inline, default = "program", example = "program", extensions(("x-advanced" = json!(true))))]
+    pub correct_to: CorrectTo,
+}
+
+/// What the work is corrected to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrectTo {
+    /// What the program leaves on work and machine that do not yield.
+    #[default]
+    Program,
+    /// The part of `drawing`, where it says a diameter and the program comes within 0.5 mm of it; elsewhere what the program leaves.
+    Drawing,
 }
 
 fn eight() -> f64 {

@@ -316,10 +316,11 @@ impl Curve {
     fn of(stroke: &Stroke<'_>, places: &[PlaceOfMove]) -> Self {
         let length_mm = stroke.way.length_mm();
         let cuts = |of: &PlaceOfMove| of.place.depth_mm > 0.0;
-        let lowest = places.iter().filter(|of| cuts(of)).map(|of| -of.place.lift_mm).fold(0.0, f64::min);
+        let shift = |of: &PlaceOfMove| of.place.wanted_mm - of.place.lift_mm;
+        let lowest = places.iter().filter(|of| cuts(of)).map(shift).fold(0.0, f64::min);
         let wanted = |of: &PlaceOfMove| Wanted {
             at: of.place.share * length_mm,
-            shift: if cuts(of) { -of.place.lift_mm } else { -of.place.clear_mm.clamp(0.0, -lowest) },
+            shift: if cuts(of) { shift(of) } else { -of.place.clear_mm.clamp(0.0, -lowest) },
             cuts: cuts(of),
         };
         let clear = |of: Option<&PlaceOfMove>| of.map_or(0.0, |of| of.place.clear_mm.max(0.0));

@@ -160,6 +160,33 @@ impl Shape {
         Some(Piece { x0: ends[0][0], x1: ends[1][0], curve: Curve::through(ends[0], ends[1]) })
     }
 
+    /// From the programmed point to the place of the surface that a feed along the axis makes; none where neither the nose nor
+    /// the corner makes it.
+    pub(crate) fn makes(&self, [x, r]: [f64; 2]) -> Option<[f64; 2]> {
+        let slope = r / x;
+        (x.abs() > ACROSS && self.has_slope(slope)).then(|| self.support(slope))
+    }
+
+    /// How far from the programmed point, along the axis, its lower boundary rises by no more than so much: toward the headstock and
+    /// the other way, mm.
+    pub(crate) fn extent_mm(&self, by_mm: f64) -> [f64; 2] {
+        let x = self.centre[0];
+        let reach = |edge: Option<f64>| self.reach(edge) + edge.map_or(0.0, |slope| by_mm / slope);
+        [x - reach(self.left), x + reach(self.right)]
+    }
+
+    /// Its lower boundary over the programmed point, so far beside it along the axis, mm; none where it has none.
+    pub(crate) fn height_mm(&self, beside: f64) -> Option<f64> {
+        let by = beside - self.centre[0];
+        let edge = if by < 0.0 { self.left } else { self.right };
+        let reach = self.reach(edge);
+        if by.abs() <= reach {
+            return Some(self.centre[1] - (self.nose * self.nose - by * by).max(0.0).sqrt());
+        }
+        let slope = edge?;
+        Some(self.centre[1] + self.nose * Self::below(slope)[1] + (by.abs() - reach) * slope)
+    }
+
     /// What the way leaves.
     pub(crate) fn sweep(&self, way: &Way) -> Swept {
         let mut swept = Swept::default();

@@ -9,6 +9,7 @@ use crate::force::ForceModel;
 use super::super::super::job::{Job, ProgramStock};
 use super::super::reader::{Kind, Program};
 use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
+use super::aim::Aim;
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
 use super::sections::{Lumps, slices};
 
@@ -80,7 +81,7 @@ pub(crate) struct Yielded {
     pub(crate) close: Vec<Clearance>,
     /// What each move that cuts along the axis asks of the force law.
     pub(crate) cuts: Vec<CutMove>,
-    /// What is left, and what would be, did nothing yield.
+    /// What is left, and what is meant to be: what would be, did nothing yield, or the drawing.
     pub(crate) real: Vec<Part>,
     pub(crate) nominal: Vec<Part>,
     /// Lines that cut in another direction than the force law was measured in.
@@ -153,6 +154,7 @@ pub(crate) fn yielding(
 ) -> Result<Yielded, Failure> {
     let mut meant = Meant { before: blank(stock), after: blank(stock) };
     let mut real = blank(stock);
+    let aim = Aim::of(job, || rigid(program, job, (stock, zero)));
     let mut yielded = Yielded {
         places: Vec::new(),
         rapids: Vec::new(),
@@ -209,6 +211,7 @@ pub(crate) fn yielding(
             real: &real,
             goes_on: last_cut == stroke.index.checked_sub(1),
             is_corrected: driven.corrected.contains(&stroke.index),
+            aim: aim.as_ref(),
         };
         let is_corrected = cutting.is_corrected;
         let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
@@ -216,12 +219,13 @@ pub(crate) fn yielding(
         let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
         let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
-        if is_corrected {
+        if is_corrected && aim.is_none() {
             real.cut_along(shape, way, one.line);
         } else {
+            let off = |place: &CutPlace| if is_corrected { place.wanted_mm } else { place.lift_mm };
             let lifted: Vec<Way> = places
                 .windows(2)
-                .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
+                .map(|pair| way.lifted([pair[0].share, pair[1].share], [off(&pair[0]), off(&pair[1])]))
                 .collect();
             real.cut_along_all(shape, &lifted, one.line);
         }
@@ -243,8 +247,17 @@ pub(crate) fn yielding(
         yielded.places.extend(places.into_iter().map(|place| PlaceOfMove { line, mv, place }));
     }
     yielded.real = real.parts();
-    yielded.nominal = meant.after.parts();
+    yielded.nominal = aim.map_or_else(|| meant.after.parts(), Aim::into_meant);
     Ok(yielded)
+}
+
+/// What a program leaves on rigid work.
+fn rigid(program: &Program, job: &Job, (stock, zero): (&ProgramStock, f64)) -> Vec<Part> {
+    let mut chain = blank(stock);
+    for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
+        chain.cut_along(&stroke.shape, &stroke.way, stroke.one.line);
+    }
+    chain.parts()
 }
 
 /// Where the work bends as a few slices do: everywhere but about the tool, unless its weight counts, or
@@ -373,7 +386,9 @@ impl Along<'_> {
             for (i, place) in places.iter().enumerate() {
                 if let Some((_, between)) = next.next_if(|(at, _)| **at == i) {
                     let before: &CutPlace = &places[i - 1];
-                    let bent = (between.lift_mm - 0.5 * (before.lift_mm + place.lift_mm)).abs() > self.straight_mm;
+                    let off = |of: fn(&CutPlace) -> f64| of(between) - 0.5 * (of(before) + of(place));
+                    let off = off(|place| place.lift_mm).abs().max(off(|place| place.wanted_mm).abs());
+                    let bent = off > self.straight_mm;
                     if let Some(last) = open.last_mut() {
                         *last = bent;
                     }
@@ -407,6 +422,10 @@ impl Along<'_> {
             for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
                 shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
             }
+        }
+        if let Some(aim) = self.cutting.aim.filter(|_| self.cutting.is_corrected) {
+            let beside = [-NEAREST_MM, NEAREST_MM].map(|by| by / length);
+            shares.extend(aim.breaks(self.cutting.stroke).iter().flat_map(|at| beside.map(|by| at + by)));
         }
         shares.retain(|share| (0.0..=1.0).contains(share));
         shares.sort_by(f64::total_cmp);
