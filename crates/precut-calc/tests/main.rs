@@ -97,6 +97,7 @@ mod process_loop;
 mod process_streams;
 mod process_support;
 mod process_watch;
+mod program_across;
 mod program_correction;
 mod program_drawing;
 mod program_fuzz;
