@@ -102,6 +102,7 @@ mod program_correction;
 mod program_drawing;
 mod program_fuzz;
 mod program_keep_out;
+mod program_nose;
 mod program_reading;
 mod program_refeed;
 mod program_stock;

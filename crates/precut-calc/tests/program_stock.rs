@@ -403,8 +403,11 @@ fn what_does_not_go_together_is_refused() {
     let missing = refused(&bar(&text, 100.0));
     assert_eq!((missing.code, missing.pointer.as_str()), ("tool_missing", "/tools"));
     assert_eq!(missing.values.get("names"), Some(&vec!["3"].into()));
-    let nose = format!("{HEAD}G0 X40. Z2.\nG42 X36.\nG1 Z-50. F0.2\nG40 X42.\nM30\n");
-    assert_eq!(refused(&bar(&nose, 100.0)).code, "nose_compensation_not_driven");
+    // A hollow that is narrower than the nose.
+    let nose = format!("{HEAD}G0 X40. Z2.\nG42 X36.\nG1 Z-50. F0.2\nG2 X37. Z-50.5 R0.5\nG1 X42.\nG40 X44.\nM30\n");
+    let refused_nose = refused(&bar(&nose, 100.0));
+    assert_eq!(refused_nose.code, "nose_compensation_not_driven");
+    assert_eq!(refused_nose.values.get("line").cloned(), Some(Said::from(7_usize)));
     let good = bar(&format!("{HEAD}G0 X36. Z2.\nG1 Z-50. F0.2\nM30\n"), 100.0);
     let with = |pointer: &str, value: Value| {
         let mut job = good.clone();

@@ -4,7 +4,7 @@ use super::Reader;
 use super::arcs;
 use super::codes::Path;
 use super::faults::Spot;
-use super::moves::{Kind, Place};
+use super::moves::{Kind, Nose, Place};
 
 /// Lengths that are no different, mm.
 pub(super) const SAME_MM: f64 = 1e-9;
@@ -117,6 +117,8 @@ impl<'a> Reader<'a> {
             self.notes.fault_with(spot, "too_many_moves", |finding| finding.with("limit_moves", 4 * MAX_PASSES));
             return;
         }
+        // Controls rough without compensation of the nose.
+        let nose = std::mem::replace(&mut self.state.nose, Nose::Off);
         // A pass reaches the first part that is as high as it.
         let mut part = 0;
         let mut hits = Vec::new();
@@ -146,6 +148,7 @@ impl<'a> Reader<'a> {
         self.follow(line, &contour);
         self.go(line, Kind::Rapid, sight.place([start, last.end[1]]), None);
         self.go(line, Kind::Rapid, Place::at(x0, z0), None);
+        self.state.nose = nose;
     }
 
     /// Passes along the contour, each nearer to it; the last one leaves the allowances.
@@ -163,12 +166,13 @@ impl<'a> Reader<'a> {
         // Below MAX_PASSES.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let passes = passes as usize;
+        let nose = std::mem::replace(&mut self.state.nose, Nose::Off);
         for pass in 0..passes {
             let left = if passes > 1 { 1.0 - pass as f64 / (passes - 1) as f64 } else { 0.0 };
             let shift = [allowance[0] + left * shift_r, allowance[1] + left * shift_z];
             let shifted: Vec<Element> = contour.iter().map(|one| one.shifted(shift)).collect();
             let (Some(first), Some(last)) = (shifted.first(), shifted.last()) else {
-                return;
+                break;
             };
             let out = (2.0 * last.end[0]).max(x0);
             self.go(line, Kind::Rapid, Place::at(2.0 * first.start[0], z0), None);
@@ -177,6 +181,7 @@ impl<'a> Reader<'a> {
             self.go(line, Kind::Rapid, Place::at(out, z0), None);
         }
         self.go(line, Kind::Rapid, Place::at(x0, z0), None);
+        self.state.nose = nose;
     }
 
     /// At the feed to the beginning of a contour and along it.

@@ -9,6 +9,7 @@ use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
 use super::edges::EdgeEnds;
+use super::nose::{self, Compensated, Programmed};
 use super::sweep::{Shape, Swept, Way};
 
 /// Why a program is not driven over its blank.
@@ -179,21 +180,54 @@ pub(crate) struct Stroke<'p> {
     pub(crate) one: &'p ProgramMove,
     pub(crate) tool: &'p ProgramTool,
     pub(crate) shape: Shape,
+    /// Of the programmed point, were there no compensation of the nose.
     pub(crate) way: Way,
+    /// Shares of the programmed path beside which it begins and ends.
+    pub(crate) programmed: [f64; 2],
+}
+
+/// The tools of a program that are described, with their regions.
+fn tools_of<'p>(program: &Program, job: &'p Job) -> Vec<Option<(&'p ProgramTool, Shape)>> {
+    let described = |name: &String| job.tools.iter().find(|tool| tool.number == *name).map(|tool| (tool, shape(tool)));
+    program.tools.iter().map(described).collect()
+}
+
+/// Where the nose goes, of the moves of a program with compensation; empty where it has none. The line of a move that cannot be
+/// followed where there is one.
+fn compensated(program: &Program, job: &Job, zero: f64) -> Result<Vec<Option<Compensated>>, usize> {
+    if program.moves.iter().all(|one| one.nose == Nose::Off) {
+        return Ok(Vec::new());
+    }
+    let tools = tools_of(program, job);
+    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    let programmed = program.moves.iter().map(|one| {
+        let begin = std::mem::replace(&mut from, one.end.known());
+        let (_, shape) = one.tool.and_then(|tool| tools.get(tool as usize).copied().flatten())?;
+        Some(Programmed {
+            way: way(one, begin?, one.end.known()?, zero),
+            nose: one.nose,
+            radius: shape.nose,
+            centre: shape.centre,
+            tool: one.tool,
+        })
+    });
+    let programmed: Vec<Option<Programmed>> = programmed.collect();
+    nose::ways(&programmed).map_err(|at| program.moves.get(at).map_or(1, |one| one.line))
 }
 
 /// The moves of a program over a blank: those between known places, of tools that are described.
 pub(crate) fn strokes<'p>(program: &'p Program, job: &'p Job, zero: f64) -> impl Iterator<Item = Stroke<'p>> {
-    let tools: Vec<Option<(&ProgramTool, Shape)>> = program
-        .tools
-        .iter()
-        .map(|name| job.tools.iter().find(|tool| tool.number == *name).map(|tool| (tool, shape(tool))))
-        .collect();
+    let tools = tools_of(program, job);
+    // A program that cannot be followed is refused before anything is made of it.
+    let compensated = compensated(program, job, zero).unwrap_or_default();
     let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
     program.moves.iter().enumerate().filter_map(move |(index, one)| {
         let begin = std::mem::replace(&mut from, one.end.known());
         let (tool, shape) = one.tool.and_then(|tool| tools.get(tool as usize).copied().flatten())?;
-        Some(Stroke { index, one, tool, shape, way: way(one, begin?, one.end.known()?, zero) })
+        let as_programmed = || Some((way(one, begin?, one.end.known()?, zero), [0.0, 1.0]));
+        let beside = compensated.get(index).copied().flatten().map(|found| (found.way, found.programmed));
+        let (way, programmed) = beside.or_else(as_programmed)?;
+        Some(Stroke { index, one, tool, shape, way, programmed })
     })
 }
 
@@ -227,8 +261,8 @@ pub(crate) fn turned(
             Finding::new("tool_missing", "/tools").with("names", names).with("lines", lines),
         ));
     }
-    if let Some(one) = program.moves.iter().find(|one| one.kind.is_feed() && one.nose != Nose::Off) {
-        let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", one.line);
+    if let Err(line) = compensated(program, job, zero) {
+        let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", line);
         return Err(Failure::OutOfModel(finding));
     }
     let mut chain = blank(stock);
@@ -245,7 +279,7 @@ pub(crate) fn turned(
     let mut kept_out: Vec<(Chain, Option<u32>)> =
         job.keep_out.iter().map(|keep_out| (cylinder(keep_out), keep_out.support)).collect();
     let mut pace = Pace::new(monitor);
-    for Stroke { index, one, tool, shape, way } in strokes(program, job, zero) {
+    for Stroke { index, one, tool, shape, way, .. } in strokes(program, job, zero) {
         pace.work(WORK_OF_MOVE * (1 + kept_out.len()) + chain.take_looked_at() * WORK_OF_PART)?;
         for (place, (kept_out, support)) in kept_out.iter_mut().enumerate() {
             if support.is_some_and(|support| !job.acts(support, program.executed_at(index))) {
