@@ -6,14 +6,17 @@ use super::super::stock::{Part, Piece, Shape, Stroke, Way, outline};
 /// A surface that is farther off the drawing is another shape, which no shift of a cut should make, mm on the radius.
 pub(crate) const FARTHEST_MM: f64 = 0.25;
 
+/// A move makes a surface that it leaves so near to what it passes over, mm.
+const MAKES_MM: f64 = 1e-3;
 /// So far inside its ends a move is held against the drawing, mm.
 const INSIDE_MM: f64 = 1e-6;
 
 /// The outline that is meant: what a program leaves on rigid work, and the drawing where it comes near to that.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Aim {
-    /// The drawing, and what is meant.
+    /// The drawing, what the program leaves on rigid work, and what is meant.
     drawn: Vec<Part>,
+    nominal: Vec<Part>,
     meant: Vec<Part>,
 }
 
@@ -30,8 +33,9 @@ impl Aim {
         if job.mode.correct_to != CorrectTo::Drawing || drawn.is_empty() {
             return None;
         }
-        let meant = meant(&drawn, &nominal());
-        Some(Self { drawn, meant })
+        let nominal = nominal();
+        let meant = meant(&drawn, &nominal);
+        Some(Self { drawn, nominal, meant })
     }
 
     /// What is meant.
@@ -48,7 +52,11 @@ impl Aim {
         let made = stroke.way.direction(share).and_then(|direction| stroke.shape.makes(direction));
         let Some([by_x, by_r]) = made else { return 0.0 };
         let [x, r] = stroke.way.at(share);
-        let drawn = at(&self.drawn, x + by_x).map_or(0.0, |part| part.piece.curve.at(x + by_x) - r - by_r);
+        let radius = |parts: &[Part]| at(parts, x + by_x).map(|part| part.piece.curve.at(x + by_x));
+        // Where another move makes the surface, this one is clear of it.
+        let made_mm = r + by_r;
+        let makes = radius(&self.nominal).is_some_and(|left| (left - made_mm).abs() <= MAKES_MM);
+        let drawn = radius(&self.drawn).filter(|_| makes).map_or(0.0, |drawn| drawn - made_mm);
         let off = if drawn.abs() <= FARTHEST_MM { drawn } else { 0.0 };
         off.max(self.clear_mm(&stroke.shape, [x, r]))
     }
