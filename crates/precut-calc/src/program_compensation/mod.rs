@@ -189,7 +189,7 @@ fn yielded(
     let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
     monitor.progress(0.5, Message::new("stage_yielding"));
     let finishing = stock::lines_that_finish(turned);
-    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
+    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on: None };
     yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
 }
 

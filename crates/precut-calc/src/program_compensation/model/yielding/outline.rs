@@ -80,7 +80,8 @@ impl Outline {
     pub(crate) fn engaged(&self, stock: &Chain, [x, r]: [f64; 2]) -> Engaged {
         let centre = [x + self.centre[0] + AHEAD_MM * self.feed[0], r + self.centre[1] + AHEAD_MM * self.feed[1]];
         let tip = [centre[0] + self.nose * self.normal[0], centre[1] + self.nose * self.normal[1]];
-        let placed = Placed::of(self, centre, stock);
+        let mut placed = Placed::of(self, centre, stock);
+        placed.end_above(stock);
         let mut marks = Vec::with_capacity(MARKS);
         marks.extend([0.0, placed.end]);
         placed.crossings(stock, &mut marks);
@@ -164,16 +165,40 @@ impl Placed {
         [self.edge[0] + beyond * self.along[0], self.edge[1] + beyond * self.along[1]]
     }
 
+    /// Ends the outline where it has come above all stock that it reaches: what lies beyond is in none.
+    fn end_above(&mut self, stock: &Chain) {
+        let ([low, high], _) = self.extent();
+        let highest = stock.parts_between(low, high).map(|part| part.piece.highest()).fold(0.0, f64::max) + NEAR_MM;
+        let of_nose = self.nose * self.lead;
+        if self.along[1] <= FLAT {
+            return;
+        }
+        if self.edge[1] < highest {
+            self.end = self.end.min(of_nose + (highest - self.edge[1]) / self.along[1]);
+            return;
+        }
+        self.end = of_nose;
+        // From the lowest point of the nose on it only rises.
+        let below = self.centre[1] - highest;
+        let lowest = self.sense_to(-FRAC_PI_2);
+        let lowest = if lowest > PI { lowest - 2.0 * PI } else { lowest };
+        if below > 0.0 && below < self.nose && lowest < self.lead {
+            self.end = self.end.min(self.nose * (lowest + (below / self.nose).acos())).max(0.0);
+        }
+    }
+
     /// Both ends of the outline along the axis, and its lowest radius. What lies beside it, as all that the moves before have made
     /// behind the tip, or below it, is not looked at.
     fn extent(&self) -> ([f64; 2], f64) {
-        let points = [self.at(0.0), self.edge, self.at(self.end)];
+        let is_on_nose = self.end < self.nose * self.lead;
+        let last = self.at(self.end);
         let (mut low, mut high, mut lowest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
-        for [x, r] in points {
+        for [x, r] in [self.at(0.0), if is_on_nose { last } else { self.edge }, last] {
             (low, high, lowest) = (low.min(x), high.max(x), lowest.min(r));
         }
         // The nose goes on to its ends along the axis and to its lowest point, where the outline comes by them.
-        let has = |angle: f64| self.sense_to(angle) < self.lead;
+        let turned = if is_on_nose { self.end / self.nose } else { self.lead };
+        let has = |angle: f64| self.sense_to(angle) < turned;
         if has(PI) {
             low = low.min(self.centre[0] - self.nose);
         }
