@@ -1,5 +1,7 @@
 //! What the work is corrected to where that is the drawing, and not what the program itself means (`program/5`).
 
+use std::collections::BTreeMap;
+
 use super::super::super::job::{CorrectTo, Job};
 use super::super::stock::{Part, Piece, Shape, Stroke, Way, outline};
 
@@ -18,6 +20,8 @@ pub(crate) struct Aim {
     drawn: Vec<Part>,
     nominal: Vec<Part>,
     meant: Vec<Part>,
+    /// Ends of the parts that a line makes, by the lines.
+    made: BTreeMap<usize, Vec<[f64; 2]>>,
 }
 
 /// The part at a place; none beside all of them.
@@ -35,7 +39,13 @@ impl Aim {
         }
         let nominal = nominal();
         let meant = meant(&drawn, &nominal);
-        Some(Self { drawn, nominal, meant })
+        let mut made: BTreeMap<usize, Vec<[f64; 2]>> = BTreeMap::new();
+        for part in &nominal {
+            if let Some(line) = part.owner {
+                made.entry(line).or_default().push([part.piece.x0, part.piece.x1]);
+            }
+        }
+        Some(Self { drawn, nominal, meant, made })
     }
 
     /// What is meant.
@@ -52,13 +62,30 @@ impl Aim {
         let made = stroke.way.direction(share).and_then(|direction| stroke.shape.makes(direction));
         let Some([by_x, by_r]) = made else { return 0.0 };
         let [x, r] = stroke.way.at(share);
-        let radius = |parts: &[Part]| at(parts, x + by_x).map(|part| part.piece.curve.at(x + by_x));
-        // Where another move makes the surface, this one is clear of it.
-        let made_mm = r + by_r;
-        let makes = radius(&self.nominal).is_some_and(|left| (left - made_mm).abs() <= MAKES_MM);
-        let drawn = radius(&self.drawn).filter(|_| makes).map_or(0.0, |drawn| drawn - made_mm);
+        let radius = |parts: &[Part], x: f64| at(parts, x).map(|part| part.piece.curve.at(x));
+        // Where another move makes the surface, this one goes on as it is to where it makes one itself.
+        let is_made =
+            |x: f64, made_mm: f64| radius(&self.nominal, x).is_some_and(|left| (left - made_mm).abs() <= MAKES_MM);
+        let mut place = [x + by_x, r + by_r];
+        if !is_made(place[0], place[1])
+            && let (Way::Line(from, to), Some(beside)) = (stroke.way, self.nearest(stroke.one.line, place[0]))
+        {
+            place = [beside, place[1] + (beside - place[0]) * (to[1] - from[1]) / (to[0] - from[0])];
+        }
+        let drawn = radius(&self.drawn, place[0]).filter(|_| is_made(place[0], place[1]));
+        let drawn = drawn.map_or(0.0, |drawn| drawn - place[1]);
         let off = if drawn.abs() <= FARTHEST_MM { drawn } else { 0.0 };
         off.max(self.clear_mm(&stroke.shape, [x, r]))
+    }
+
+    /// The place nearest to another one at which a line makes the surface.
+    fn nearest(&self, line: usize, x: f64) -> Option<f64> {
+        let inside = |&[from, to]: &[f64; 2]| {
+            let least = INSIDE_MM.min(0.5 * (to - from));
+            x.clamp(from + least, to - least)
+        };
+        let places = self.made.get(&line)?.iter().map(inside);
+        places.min_by(|a, b| (a - x).abs().total_cmp(&(b - x).abs()))
     }
 
     /// By how much a tool at a place stands too deep for what is meant beside the place that it makes: there a step of the drawing comes
