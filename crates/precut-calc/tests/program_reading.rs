@@ -50,7 +50,7 @@ pub(crate) fn number(finding: &Finding, name: &str) -> f64 {
     }
 }
 
-fn word(finding: &Finding) -> String {
+pub(crate) fn word(finding: &Finding) -> String {
     match finding.values.get("word") {
         Some(Said::Text(text)) => text.to_string(),
         other => panic!("{other:?}"),

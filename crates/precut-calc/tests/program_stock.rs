@@ -258,6 +258,59 @@ fn a_way_that_falls_behind_the_tip_is_told() {
     assert!((40.0..=45.5).contains(&told), "{told}");
 }
 
+/// A cut that goes on beyond the end of the edge is told, and no more once what is advised is done.
+#[test]
+fn an_edge_that_is_too_short_is_told() {
+    let told = |text: &str, edit: &dyn Fn(&mut Value)| {
+        let mut job = bar(&format!("{HEAD}{text}M30\n"), 100.0);
+        job["tools"][0]["edge_length_mm"] = json!(6);
+        edit(&mut job);
+        let found = solve(&job).warnings.into_iter().find(|warning| warning.code == "edge_too_short");
+        found.map(|warning| {
+            let line = match warning.values.get("line") {
+                Some(Said::Number(line)) => *line,
+                other => panic!("{other:?}"),
+            };
+            (line, warning.value.unwrap(), warning.limit.unwrap())
+        })
+    };
+    let same = |found: Option<(f64, f64, f64)>, wanted: (f64, f64)| {
+        let (line, value, limit) = found.unwrap();
+        assert!((line - wanted.0).abs() < 1e-9 && (value - wanted.1).abs() < 1e-9, "{line} {value}, {wanted:?}");
+        assert!((limit - 6.0).abs() < 1e-9, "{limit}");
+    };
+    // The corner without a nose lies 0.8 / tan 40 deg off the end of the nose; the edge leans by 5 degrees.
+    let (leans, corner) = (5_f64.to_radians(), 0.8 / 40_f64.to_radians().tan());
+    let end = 0.8 + 0.8 * leans.sin() + (6.0 - corner) * leans.cos();
+    let along = "G0 X24. Z2.\nG1 Z-50. F0.2\nX42.\nG0 X60.\n";
+    same(told(along, &|_| {}), (5.0, 8.0 - end));
+    assert_eq!(told(&along.replace("X24.", &format!("X{:.3}", 40.01 - 2.0 * end)), &|_| {}), None, "less depth");
+    assert_eq!(told(along, &|job| job["tools"][0]["edge_length_mm"] = json!(8.2)), None, "a longer edge");
+    assert_eq!(told(along, &|job| job["tools"][0]["edge_length_mm"] = Value::Null), None, "nothing is known of it");
+    // Facing inward the trailing edge leads: it rises by as little, so that its end has nearly all of the radius above it.
+    let face = "G0 X44. Z-7.\nG1 X10. F0.2\nG0 Z2.\nX60.\n";
+    let risen = 0.8 - 0.8 * leans.cos() + (6.0 - corner) * leans.sin();
+    same(told(face, &|_| {}), (5.0, 15.0 - risen));
+    assert_eq!(told(&face.replace("Z-7.", "Z-5."), &|_| {}), None, "less depth");
+    // An edge at 45 degrees comes to a collar long before its tip: 15 mm before it the edge has risen by as much.
+    let collar = |job: &mut Value| {
+        job["stock"]["profile"] = json!([
+            { "z_mm": 0, "diameter_mm": 70 }, { "z_mm": 40, "diameter_mm": 70 },
+            { "z_mm": 40, "diameter_mm": 40 }, { "z_mm": 100, "diameter_mm": 40 },
+        ]);
+        job["tools"][0]["cutting_edge_angle_deg"] = json!(45);
+        job["tools"][0]["nose_radius_mm"] = json!(0);
+    };
+    let up_to = |z: f64| format!("G0 X36. Z2.\nG1 Z{z:.1} F0.2\nG0 X100.\n");
+    same(told(&up_to(-45.0), &collar), (5.0, 35.0 - 33.0));
+    assert_eq!(told(&up_to(-42.0), &collar), None);
+    // Along an arc the end of the edge goes along one; most stands above it where it comes into the work, behind the tip.
+    let arc = "G0 X20. Z2.\nG1 Z0. F0.2\nG3 X40. Z-10. R10.\nG1 X42.\nG0 X60.\n";
+    let behind = 0.8 - 0.8 * leans.cos() + (6.0 - corner) * leans.sin();
+    let radius = 10.0 + (100.0 - (10.0 - behind).powi(2)).sqrt();
+    same(told(arc, &|_| {}), (6.0, 20.0 - radius - end));
+}
+
 #[test]
 fn a_blank_that_is_too_thin_is_told() {
     let text = format!("{HEAD}G0 X36. Z2.\nG1 Z-100. F0.2\nX42.\nG0 X60.\nM30\n");
@@ -350,8 +403,11 @@ fn what_does_not_go_together_is_refused() {
     let missing = refused(&bar(&text, 100.0));
     assert_eq!((missing.code, missing.pointer.as_str()), ("tool_missing", "/tools"));
     assert_eq!(missing.values.get("names"), Some(&vec!["3"].into()));
-    let nose = format!("{HEAD}G0 X40. Z2.\nG42 X36.\nG1 Z-50. F0.2\nG40 X42.\nM30\n");
-    assert_eq!(refused(&bar(&nose, 100.0)).code, "nose_compensation_not_driven");
+    // A hollow that is narrower than the nose.
+    let nose = format!("{HEAD}G0 X40. Z2.\nG42 X36.\nG1 Z-50. F0.2\nG2 X37. Z-50.5 R0.5\nG1 X42.\nG40 X44.\nM30\n");
+    let refused_nose = refused(&bar(&nose, 100.0));
+    assert_eq!(refused_nose.code, "nose_compensation_not_driven");
+    assert_eq!(refused_nose.values.get("line").cloned(), Some(Said::from(7_usize)));
     let good = bar(&format!("{HEAD}G0 X36. Z2.\nG1 Z-50. F0.2\nM30\n"), 100.0);
     let with = |pointer: &str, value: Value| {
         let mut job = good.clone();

@@ -12,8 +12,8 @@ pub use answer::output::{
     Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
 };
 pub use job::{
-    DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
-    ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
+    CorrectTo, DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart,
+    ProgramStock, ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 6,
+        version: 7,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -158,7 +158,8 @@ impl Calculator for ProgramCompensation {
             (turned.as_ref(), yielded.as_ref()),
             (corrected.as_ref(), refed.as_ref()),
         );
-        let explanation = advice::explanation(&output);
+        warnings.extend(advice::far_from_drawing(&output, job.mode.correct_to));
+        let explanation = advice::explanation(&output, job.mode.correct_to);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
     }
@@ -188,7 +189,7 @@ fn yielded(
     let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
     monitor.progress(0.5, Message::new("stage_yielding"));
     let finishing = stock::lines_that_finish(turned);
-    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
+    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on: None };
     yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
 }
 

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::calculator::{Finding, Message};
 
-use super::super::job::{Job, ProgramStock};
+use super::super::job::{CorrectTo, Job, ProgramStock};
 use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::reader::{Kind, Nose, Program};
 use super::super::model::stock::{Doubt, FINISHES_MM, Stroke, Turned, Way, implausible_mm, strokes};
-use super::super::model::yielding::{CLOSE_MM, CutMove, PlaceOfMove, Yielded};
+use super::super::model::yielding::{CLOSE_MM, CutMove, FARTHEST_MM, PlaceOfMove, Yielded};
 use super::output::{CompensatedProgram, Outcome, RefedProgram};
 use crate::force::{ForceModel, Reached, ReachedCut};
 
@@ -42,6 +42,8 @@ pub(crate) const WARNING_CODES: &[&str] = &[
     "left_alone",
     "rapid_close",
     "gouge",
+    "edge_too_short",
+    "far_from_drawing",
     "blank_below_contour",
 ];
 
@@ -52,7 +54,9 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "stretches_passed",
     "surface_left",
     "program_off_drawing",
+    "program_brought_to_drawing",
     "error_along_contour",
+    "error_against_drawing",
     "program_corrected",
     "program_refed",
     "refeed_price",
@@ -60,7 +64,8 @@ pub(crate) const EXPLANATION_CODES: &[&str] = &[
     "nothing_to_correct",
 ];
 
-pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
+pub(crate) fn explanation(outcome: &Outcome, correct_to: CorrectTo) -> Vec<Message> {
+    let is_to_drawing = correct_to == CorrectTo::Drawing;
     let mut said = vec![
         Message::new("program_read")
             .with("lines", outcome.lines)
@@ -81,14 +86,14 @@ pub(crate) fn explanation(outcome: &Outcome) -> Vec<Message> {
     if let Some(drawing) = &outcome.drawing
         && let Some(largest) = drawing.program_error_um.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))
     {
-        said.push(Message::new("program_off_drawing").with("largest_um", largest));
+        let code = if is_to_drawing { "program_brought_to_drawing" } else { "program_off_drawing" };
+        said.push(Message::new(code).with("largest_um", largest));
     }
     if let Some(yielding) = &outcome.yielding
         && let Some((smallest, largest)) = yielding.smallest_error_um.zip(yielding.largest_error_um)
     {
-        said.push(
-            Message::new("error_along_contour").with("smallest_error_um", smallest).with("largest_error_um", largest),
-        );
+        let code = if is_to_drawing { "error_against_drawing" } else { "error_along_contour" };
+        said.push(Message::new(code).with("smallest_error_um", smallest).with("largest_error_um", largest));
     }
     // What was asked for comes first.
     if let Some(compensation) = &outcome.compensation {
@@ -150,6 +155,17 @@ pub(crate) fn of_corrected(corrected: &Corrected) -> Vec<Finding> {
     undersize.chain(left).collect()
 }
 
+/// Lines that finish farther off the drawing than the work is corrected to it.
+pub(crate) fn far_from_drawing(outcome: &Outcome, correct_to: CorrectTo) -> Option<Finding> {
+    let drawing = outcome.drawing.as_ref().filter(|_| correct_to == CorrectTo::Drawing)?;
+    let off = drawing.line.iter().zip(&drawing.program_error_um);
+    let far = |(&line, off_um): (&usize, &f64)| (off_um.abs() > 2e3 * FARTHEST_MM).then_some(line);
+    let lines: BTreeSet<usize> = off.filter_map(far).collect();
+    let lines: Vec<usize> = lines.into_iter().take(MOST_LINES).collect();
+    let finding = Finding::new("far_from_drawing", "/drawing").with("limit_mm", 2.0 * FARTHEST_MM);
+    (!lines.is_empty()).then(|| finding.with("lines", lines))
+}
+
 /// Lines that cut in another direction than the force law was measured in.
 pub(crate) fn turned_law(yielded: &Yielded) -> Option<Finding> {
     let lines: Vec<usize> = yielded.turned_lines.iter().copied().take(MOST_LINES).collect();
@@ -201,13 +217,14 @@ pub(crate) fn blank_below(
         (to[1] - from[1]).abs() <= ALONG * (to[0] - from[0]).abs()
     };
     let mut found: Vec<([f64; 2], f64, usize)> = Vec::new();
+    let blanks: Vec<_> = turned.parts.iter().filter(|(_, owner)| owner.is_none()).map(|(blank, _)| blank).collect();
     for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
         let line = stroke.one.line;
         let Some(meant) = stroke.shape.line(&stroke.way).filter(|_| is_along(&stroke.way)) else { continue };
         if finishing.binary_search(&line).is_err() {
             continue;
         }
-        for (blank, _) in turned.parts.iter().filter(|(_, owner)| owner.is_none()) {
+        for blank in &blanks {
             let ends = [blank.x0.max(meant.x0), blank.x1.min(meant.x1)];
             let low_mm = ends.map(|x| meant.curve.at(x) - blank.curve.at(x)).into_iter().fold(f64::INFINITY, f64::min);
             if ends[1] - ends[0] > FINISHES_MM && low_mm > LOW_MM {
@@ -309,5 +326,8 @@ pub(crate) fn warnings(
     let gouges = turned.gouges.iter().take(MOST_LINES).map(|(line, [falls_deg, edge_deg])| {
         Finding::new("gouge", "/nc_program").measured(*falls_deg, *edge_deg, "deg").with("line", *line)
     });
-    doubt.into_iter().chain(rapid).chain(hits).chain(gouges).collect()
+    let short = turned.beyond_edge.iter().take(MOST_LINES).map(|(line, [beyond_mm, length_mm])| {
+        Finding::new("edge_too_short", "/nc_program").measured(*beyond_mm, *length_mm, "mm").with("line", *line)
+    });
+    doubt.into_iter().chain(rapid).chain(hits).chain(gouges).chain(short).collect()
 }

@@ -228,6 +228,7 @@ pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
         };
         let kinds = outcome.cycles.iter().map(|cycle| match cycle.kind {
             CycleKind::RoughZ => "rough_z".into(),
+            CycleKind::RoughX => "rough_x".into(),
             CycleKind::Pattern => "pattern".into(),
             CycleKind::Finishing => "finishing".into(),
         });

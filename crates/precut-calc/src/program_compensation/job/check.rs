@@ -4,7 +4,7 @@ use crate::calculator::{Check, Finding, Violations};
 use crate::machinability::ModelForm;
 use crate::material;
 
-use super::input::{Job, ModeKind};
+use super::input::{CorrectTo, Job, ModeKind};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &[
@@ -25,6 +25,7 @@ pub(crate) const CODES: &[&str] = &[
     "keep_out_without_length",
     "keep_out_without_stock",
     "drawing_without_stock",
+    "drawing_missing",
     "no_such_support",
     "unknown_material",
     "elastic_constants_missing",
@@ -48,9 +49,18 @@ impl Check for Job {
                     .measured(keep_out.z_end_mm, keep_out.z_start_mm, "mm")
                     .with("above", keep_out.z_start_mm)
             });
+            let count = self.supports.len() as f64;
+            violations.require(keep_out.support.is_none_or(|support| f64::from(support) < count), || {
+                Finding::new("no_such_support", format!("/keep_out/{i}/support"))
+                    .measured(keep_out.support.map_or(0.0, f64::from), count, "1")
+                    .with("below", count)
+            });
         }
         violations.require(self.drawing.is_empty() || self.stock.is_some(), || {
             Finding::new("drawing_without_stock", "/stock")
+        });
+        violations.require(self.mode.correct_to == CorrectTo::Program || !self.drawing.is_empty(), || {
+            Finding::new("drawing_missing", "/drawing")
         });
         violations.require(self.keep_out.is_empty() || self.stock.is_some(), || {
             Finding::new("keep_out_without_stock", "/stock")

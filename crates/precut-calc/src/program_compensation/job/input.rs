@@ -35,7 +35,7 @@ pub struct Job {
     #[schema(extensions(("x-group" = json!("workpiece"))))]
     pub stock: Option<ProgramStock>,
     /// The part of the drawing from the headstock end; a place twice is a step. With it the answer says how far the program is off it on
-    /// work and machine that do not yield; it is never corrected to it.
+    /// work and machine that do not yield; it is corrected to it where `mode.correct_to` says so.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000, extensions(("x-group" = json!("workpiece")), ("x-advanced" = json!(true))))]
     pub drawing: Vec<StockRow>,
@@ -87,6 +87,14 @@ pub struct Job {
 }
 
 impl Job {
+    /// Whether a support acts in a line of the program.
+    pub(crate) fn acts(&self, support: u32, line: usize) -> bool {
+        let mut told = self.support_lines.iter().filter(|told| told.support == support);
+        told.all(|told| {
+            told.from_line.is_none_or(|from| from as usize <= line) && told.to_line.is_none_or(|to| line <= to as usize)
+        })
+    }
+
     /// What holds the blank and what pushes it, where the job says by which forces.
     pub(crate) fn holding(&self) -> Option<Holding> {
         let (stock, force) = self.stock.as_ref().zip(self.force.as_ref())?;
@@ -171,6 +179,11 @@ pub struct KeepOut {
     /// Diameter.
     #[schema(minimum = 0.01, maximum = 10_000.0, example = 120.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("D"))))]
     pub diameter_mm: f64,
+    /// The support that it belongs to, by its place in `supports`, from 0: it stands there in the lines in which that acts. Left out,
+    /// it always does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0, maximum = 7, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("i"))))]
+    pub support: Option<u32>,
 }
 
 /// The blank.
@@ -264,6 +277,11 @@ pub struct ProgramTool {
     /// tailstock and axis (a left-hand tool), 8 the lowest point, 0 and 9 the centre of the nose.
     #[schema(minimum = 0, maximum = 9, example = 3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("T"))))]
     pub tip_direction: u8,
+    /// Length of its edges from the corner that they would have without a nose, as in ISO 1832. With it a cut that goes on beyond
+    /// the end of the edge is told, and the tool comes into a place of `keep_out` no farther than its edges reach.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.1, maximum = 1000.0, example = 12.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l")), ("x-advanced" = json!(true))))]
+    pub edge_length_mm: Option<f64>,
 }
 
 /// How a control reads what a program does not say.
@@ -412,6 +430,21 @@ pub struct Mode {
     #[serde(default)]
     #[schema(default = false, example = false, extensions(("x-advanced" = json!(true))))]
     pub stamp: bool,
+    /// What the work is corrected to.
+    #[serde(default)]
+    #[schema(inline, default = "program", example = "program", extensions(("x-advanced" = json!(true))))]
+    pub correct_to: CorrectTo,
+}
+
+/// What the work is corrected to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrectTo {
+    /// What the program leaves on work and machine that do not yield.
+    #[default]
+    Program,
+    /// The part of `drawing`, where it says a diameter and the program comes within 0.5 mm of it; elsewhere what the program leaves.
+    Drawing,
 }
 
 fn eight() -> f64 {

@@ -6,6 +6,6 @@ mod input;
 pub use crate::calculator::Dialect;
 pub(super) use check::CODES;
 pub use input::{
-    DecimalPoint, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock, ProgramTool,
-    ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
+    CorrectTo, DecimalPoint, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
+    ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };

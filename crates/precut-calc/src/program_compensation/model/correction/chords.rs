@@ -45,6 +45,8 @@ struct Gate {
     high: f64,
     /// Where a chord would best end.
     aim: f64,
+    /// A chord that ends lower makes the next one, which is no shorter than the least length, climb beyond what is near.
+    knot: f64,
 }
 
 /// Knots of the chords: the first one is `start` at the begin of the curve. `end` is the shift at its end, where that is given.
@@ -59,6 +61,7 @@ pub(crate) fn chords(curve: &[Wanted], start: f64, end: Option<f64>, limits: Lim
         gate.low = gate.low.max(start - limits.tolerance);
     }
     lean(&mut gates, &curve, limits);
+    lift_knots(&mut gates, limits.shortest);
     let mut knots: Vec<Knot> = vec![[first.at, start]];
     let mut i = 0;
     while i + 1 < gates.len() {
@@ -132,7 +135,8 @@ fn gates(curve: &[Wanted], start: f64, limits: Limits) -> Vec<Gate> {
         // A move that has to begin above its curve comes down to it.
         let highest = if wanted.at - begin <= near { highest.max(start) } else { highest };
         let high = if wanted.cuts { highest } else { all } + limits.tolerance;
-        gates.push(Gate { at: wanted.at, low: wanted.shift - limits.tolerance, high, aim: wanted.shift });
+        let low = wanted.shift - limits.tolerance;
+        gates.push(Gate { at: wanted.at, low, high, aim: wanted.shift, knot: low });
     }
     gates
 }
@@ -161,6 +165,15 @@ fn lean(gates: &mut [Gate], curve: &[Wanted], limits: Limits) {
     }
 }
 
+/// Where the tube rises within the least length of a chord, the chord before it ends as high as the tube is there.
+fn lift_knots(gates: &mut [Gate], shortest: f64) {
+    for i in 0..gates.len() {
+        let from = gates[i].at;
+        let near = gates[i..].iter().take_while(|gate| gate.at < from + shortest - SAME_MM);
+        gates[i].knot = near.map(|gate| gate.low).fold(f64::NEG_INFINITY, f64::max).min(gates[i].high);
+    }
+}
+
 /// The farthest gate that one chord reaches through all before it, and the shift there. Neither this chord nor what is left for
 /// the next ones is shorter than the least length.
 fn farthest(gates: &[Gate], i: usize, (from, end): (f64, f64), shortest: f64) -> (usize, f64) {
@@ -177,7 +190,10 @@ fn farthest(gates: &[Gate], i: usize, (from, end): (f64, f64), shortest: f64) ->
         (low, high) = (lowest, highest.max(lowest));
         let is_long = length >= shortest - SAME_MM && end - gate.at >= shortest - SAME_MM;
         if is_long || is_last {
-            found = Some((j, from + ((gate.aim - from) / length).clamp(low, high) * length));
+            let shift = from + ((gate.aim.max(gate.knot) - from) / length).clamp(low, high) * length;
+            if is_last || found.is_none() || shift >= gate.knot - SAME_MM {
+                found = Some((j, shift));
+            }
         }
     }
     found.unwrap_or((gates.len() - 1, gates[gates.len() - 1].aim))

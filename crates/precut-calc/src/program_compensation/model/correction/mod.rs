@@ -85,7 +85,8 @@ pub(crate) fn corrected(
             break None;
         }
         let drive = |bends_as: Option<&Instead>| {
-            let driven = Driven { finishing: &finishing, corrected: &eligible, bends_as };
+            let goes_on = Some(before);
+            let driven = Driven { finishing: &finishing, corrected: &eligible, bends_as, goes_on };
             yielding(program, job, holding, (stock, zero), driven, monitor)
         };
         let planned = planned((program, job), (&ways, &calls), &eligible, drive)?;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::super::super::job::Mode;
-use super::super::reader::{Feed, Kind, Program, ProgramMove, WordsOfLine};
+use super::super::reader::{Feed, Kind, Nose, Program, ProgramMove, WordsOfLine};
 use super::super::stock::{Stroke, Way};
 use super::super::yielding::{AXIS_MM, Instead, Pace, PlaceOfMove, Yielded};
 use super::calls::Calls;
@@ -61,6 +61,8 @@ pub(crate) struct LeftAlone {
 pub(crate) struct Shifts {
     /// Knots along a move by shares of it, with the shift, mm; the last one is its end.
     pub(crate) knots: BTreeMap<usize, Vec<Knot>>,
+    /// The same by shares of the programmed path, of moves with compensation of the nose.
+    pub(crate) programmed: BTreeMap<usize, Vec<Knot>>,
     /// Shift at the end of a move that has no knots, mm.
     pub(crate) ends: BTreeMap<usize, f64>,
     /// Stretches of the work, from the headstock end, over which the shift jumps and is laid on the side of the stock, mm.
@@ -92,6 +94,13 @@ impl Shifts {
         };
         self.knots.iter().filter_map(pieces).collect()
     }
+}
+
+/// Knots by shares of the programmed path: beside it the nose may begin and end elsewhere.
+fn programmed(stroke: &Stroke<'_>, knots: &[Knot]) -> Vec<Knot> {
+    let [from, to] = stroke.programmed;
+    let inner = |share: f64| if share <= 0.0 || share >= 1.0 { share } else { from + share * (to - from) };
+    knots.iter().map(|&[share, shift]| [inner(share), shift]).filter(|[share, _]| (0.0..=1.0).contains(share)).collect()
 }
 
 /// A stretch over which the work may stay thick.
@@ -236,7 +245,11 @@ impl<'a> Plan<'a> {
             let knots = chords(&curve.points, start, end, self.limits_of(stroke));
             shifts.jumps.extend(curve.jumps(&knots, self.limits.tolerance, stroke));
             let shares = knots.into_iter().map(|[at, shift]| [at / curve.length_mm, shift]);
-            shifts.knots.insert(*index, shares.collect());
+            let shares: Vec<Knot> = shares.collect();
+            if stroke.one.nose != Nose::Off {
+                shifts.programmed.insert(*index, programmed(stroke, &shares));
+            }
+            shifts.knots.insert(*index, shares);
         }
         shifts
     }
@@ -252,7 +265,9 @@ impl<'a> Plan<'a> {
             None => None,
         };
         let of_time = per_min.map_or(0.0, |feed| feed * self.min_block_min);
-        Limits { shortest: self.limits.shortest.max(of_time), ..self.limits }
+        // A control that compensates the nose wants blocks as long as it is wide.
+        let of_nose = if stroke.one.nose == Nose::Off { 0.0 } else { 2.0 * stroke.shape.nose };
+        Limits { shortest: self.limits.shortest.max(of_time).max(of_nose), ..self.limits }
     }
 
     /// Whether the next move of the program begins where this one ends, with the same tool.
@@ -316,10 +331,11 @@ impl Curve {
     fn of(stroke: &Stroke<'_>, places: &[PlaceOfMove]) -> Self {
         let length_mm = stroke.way.length_mm();
         let cuts = |of: &PlaceOfMove| of.place.depth_mm > 0.0;
-        let lowest = places.iter().filter(|of| cuts(of)).map(|of| -of.place.lift_mm).fold(0.0, f64::min);
+        let shift = |of: &PlaceOfMove| of.place.wanted_mm - of.place.lift_mm;
+        let lowest = places.iter().filter(|of| cuts(of)).map(shift).fold(0.0, f64::min);
         let wanted = |of: &PlaceOfMove| Wanted {
             at: of.place.share * length_mm,
-            shift: if cuts(of) { -of.place.lift_mm } else { -of.place.clear_mm.clamp(0.0, -lowest) },
+            shift: if cuts(of) { shift(of) } else { -of.place.clear_mm.clamp(0.0, -lowest) },
             cuts: cuts(of),
         };
         let clear = |of: Option<&PlaceOfMove>| of.map_or(0.0, |of| of.place.clear_mm.max(0.0));

@@ -138,7 +138,12 @@ pub(crate) fn proved(
     }
     let finishing = lines_that_finish(&driven_rigid);
     let of = written.moves();
-    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None };
+    // What comes before the first line that makes the contour is driven again where it is not what it was.
+    let same = task.before.moves_before_contour();
+    let is_same = program.moves.get(..same) == read.moves.get(..same)
+        && read.moves.iter().take(same).all(|one| finishing.binary_search(&one.line).is_err());
+    let goes_on = is_same.then_some(task.before);
+    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on };
     let mut after = yielding(&read, &again, holding, blank, driven, monitor)?;
     // What was meant is what the given program means.
     after.nominal.clone_from(&task.before.nominal);

@@ -218,7 +218,8 @@ impl Line<'_> {
             let z = if share >= 1.0 { end[1] } else { rounded(meant[1], grid[1]) };
             Piece { end: [x, z], share, shift_mm: 0.5 * (x - meant[0]) }
         };
-        match (shifts.knots.get(&index), shifts.ends.get(&index)) {
+        let knots = shifts.programmed.get(&index).or_else(|| shifts.knots.get(&index));
+        match (knots, shifts.ends.get(&index)) {
             (Some(knots), _) => {
                 let first =
                     Piece { end: from.unwrap_or(end), share: 0.0, shift_mm: knots.first().map_or(0.0, |knot| knot[1]) };

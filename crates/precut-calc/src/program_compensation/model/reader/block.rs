@@ -68,6 +68,7 @@ enum Once {
     ThreadRepeated,
     Groove,
     RoughAlong,
+    RoughAcross,
     Pattern,
     Finish,
 }
@@ -178,6 +179,7 @@ impl<'a> Reader<'a> {
             Meaning::ThreadRepeated => asked.once = Some((Once::ThreadRepeated, spot)),
             Meaning::Groove => asked.once = Some((Once::Groove, spot)),
             Meaning::RoughAlong => asked.once = Some((Once::RoughAlong, spot)),
+            Meaning::RoughAcross => asked.once = Some((Once::RoughAcross, spot)),
             Meaning::RoughPattern => asked.once = Some((Once::Pattern, spot)),
             Meaning::Finish => asked.once = Some((Once::Finish, spot)),
             Meaning::Dwell => asked.once = Some((Once::Dwell, spot)),
@@ -536,6 +538,7 @@ impl<'a> Reader<'a> {
                 self.go(line, Kind::Opaque, self.state.place, None);
             }
             Once::RoughAlong => return self.rough(words, spot, Use::RoughZ),
+            Once::RoughAcross => return self.rough(words, spot, Use::RoughX),
             Once::Pattern => return self.rough(words, spot, Use::Pattern),
             Once::Finish => return self.finish(words, spot),
         }
@@ -649,7 +652,7 @@ impl<'a> Reader<'a> {
                 self.notes.assume(spot, "tool", "none");
             }
         }
-        let is_roughed = matches!(self.contour, Some(Use::RoughZ | Use::Pattern));
+        let is_roughed = matches!(self.contour, Some(Use::RoughZ | Use::RoughX | Use::Pattern));
         if self.state.feed.is_none() && !is_roughed {
             if !self.is_doubtful {
                 self.notes.fault(spot, "feed_missing");

@@ -35,6 +35,7 @@ pub(super) enum Meaning {
     /// Grooves and pecks.
     Groove,
     RoughAlong,
+    RoughAcross,
     RoughPattern,
     Finish,
     Dwell,
@@ -99,6 +100,7 @@ impl Meaning {
             Self::ThreadRepeated
             | Self::Groove
             | Self::RoughAlong
+            | Self::RoughAcross
             | Self::RoughPattern
             | Self::Finish
             | Self::Dwell
@@ -188,7 +190,7 @@ fn of_fanuc_a(tenths: u32) -> Option<Meaning> {
         500 => Meaning::LimitOrShift,
         700 => Meaning::Finish,
         710 => Meaning::RoughAlong,
-        720 => Meaning::Refused("cycle_not_read"),
+        720 => Meaning::RoughAcross,
         730 => Meaning::RoughPattern,
         740 | 750 => Meaning::Groove,
         760 => Meaning::ThreadRepeated,
@@ -208,7 +210,7 @@ fn of_fanuc_b(tenths: u32) -> Option<Meaning> {
         210 => Meaning::Millimetre(true),
         700 => Meaning::Finish,
         710 => Meaning::RoughAlong,
-        720 => Meaning::Refused("cycle_not_read"),
+        720 => Meaning::RoughAcross,
         730 => Meaning::RoughPattern,
         740 | 750 => Meaning::Groove,
         760 => Meaning::ThreadRepeated,
@@ -229,7 +231,7 @@ fn of_fanuc_c(tenths: u32) -> Option<Meaning> {
         710 => Meaning::Millimetre(true),
         720 => Meaning::Finish,
         730 => Meaning::RoughAlong,
-        740 => Meaning::Refused("cycle_not_read"),
+        740 => Meaning::RoughAcross,
         750 => Meaning::RoughPattern,
         760 | 770 => Meaning::Groove,
         780 => Meaning::ThreadRepeated,

@@ -1,57 +1,27 @@
-//! Cycles over a contour: roughing in passes along the axis, passes along the contour, and finishing (`program/2.4`).
+//! Cycles over a contour, roughing and finishing: what their words say, and the contour that they name (`program/2.4`).
 
 use crate::calculator::Failure;
 
-use super::arcs;
 use super::block::Words;
 use super::codes::Path;
 use super::faults::{Notes, Spot};
 use super::lexer;
 use super::moves::{ContourCycle, CycleKind, Kind, Move, Place};
+use super::passes::{Element, SAME_MM, Sight};
 use super::words_of_line::says_way_alone;
 use super::{Reader, whole};
-
-/// Lengths that are no different, mm.
-const SAME_MM: f64 = 1e-9;
-/// Most passes of one cycle.
-const MAX_PASSES: usize = 20_000;
 
 /// What is done with the lines of a contour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     /// Passes along the axis up to it.
     RoughZ,
+    /// Passes across the axis up to it.
+    RoughX,
     /// Passes along it.
     Pattern,
     /// Run as they are.
     Finish,
-}
-
-/// A part of a contour: radius and z of its ends, mm.
-#[derive(Debug, Clone, Copy)]
-struct Element {
-    start: [f64; 2],
-    end: [f64; 2],
-    arc: Option<([f64; 2], Path)>,
-    line: usize,
-}
-
-impl Element {
-    fn shifted(self, [r, z]: [f64; 2]) -> Self {
-        let by = |point: [f64; 2]| [point[0] + r, point[1] + z];
-        let arc = self.arc.map(|(centre, path)| (by(centre), path));
-        Self { start: by(self.start), end: by(self.end), arc, line: self.line }
-    }
-
-    /// Its z where it has this radius.
-    fn z_at(&self, r: f64) -> f64 {
-        if let Some((centre, _)) = self.arc {
-            return arcs::z_at(self.start, self.end, centre, r);
-        }
-        let rise = self.end[0] - self.start[0];
-        let share = if rise.abs() <= SAME_MM { 1.0 } else { ((r - self.start[0]) / rise).clamp(0.0, 1.0) };
-        self.start[1] + share * (self.end[1] - self.start[1])
-    }
 }
 
 /// Where a contour stands.
@@ -95,10 +65,14 @@ impl<'a> Reader<'a> {
         if !self.may_cut(spot, Place::at(start[0], start[1])) {
             return Ok(next);
         }
-        let Some(contour) = self.contour_of(lines, by, spot)? else {
+        let Some((contour, sight)) = self.contour_of(lines, by, spot)? else {
             return Ok(next);
         };
-        let kind = if by == Use::RoughZ { CycleKind::RoughZ } else { CycleKind::Pattern };
+        let kind = match by {
+            Use::RoughZ => CycleKind::RoughZ,
+            Use::RoughX => CycleKind::RoughX,
+            Use::Pattern | Use::Finish => CycleKind::Pattern,
+        };
         self.cycles.push(ContourCycle {
             line: spot.line,
             kind,
@@ -110,7 +84,7 @@ impl<'a> Reader<'a> {
         let allowance = [0.5 * allowance_x, allowance_z];
         match by {
             Use::Pattern => self.along_contour(&contour, spot, allowance),
-            Use::RoughZ | Use::Finish => self.passes(&contour, spot, allowance),
+            Use::RoughZ | Use::RoughX | Use::Finish => self.passes(&contour, sight, spot, allowance),
         }
         Ok(next)
     }
@@ -124,10 +98,12 @@ impl<'a> Reader<'a> {
             let shifts = [length(u).unwrap_or(0.0), length(w).unwrap_or(0.0)];
             self.state.pattern = Some([shifts[0], shifts[1], count]);
         } else {
-            let (depth, retract) = (length(u), length(r));
+            // What a pass comes nearer by: along the radius, or along the axis.
+            let (depth, other) = if by == Use::RoughX { (w, u) } else { (u, w) };
+            let (depth, retract) = (length(depth), length(r));
             self.state.rough_depth = depth.or(self.state.rough_depth);
             self.state.rough_retract = retract.unwrap_or(self.state.rough_retract);
-            if let Some(word) = w {
+            if let Some(word) = other {
                 self.notes.fault(word.spot, "word_not_used");
             }
         }
@@ -210,8 +186,8 @@ impl<'a> Reader<'a> {
         outcome
     }
 
-    /// The contour that roughing goes to, without the way to it and without rapid moves behind it.
-    fn contour_of(&mut self, lines: Lines, by: Use, spot: Spot<'a>) -> Result<Option<Vec<Element>>, Failure> {
+    /// The contour that roughing goes to, without the way to it and without rapid moves behind it, and how its passes lie.
+    fn contour_of(&mut self, lines: Lines, by: Use, spot: Spot<'a>) -> Result<Option<(Vec<Element>, Sight)>, Failure> {
         let before = self.notes.count();
         let (state, moves) = (self.kept(), std::mem::take(&mut self.moves));
         let start = state.place;
@@ -228,25 +204,30 @@ impl<'a> Reader<'a> {
             self.notes.fault(spot, "contour_not_found");
             return Ok(None);
         };
-        if by == Use::RoughZ && approach.end[0] > approach.start[0] + SAME_MM {
+        let sight = match by {
+            Use::RoughX => Sight::across(approach.start[1], approach.end[1]),
+            Use::RoughZ | Use::Pattern | Use::Finish => Sight::Along,
+        };
+        let is_inside = match by {
+            Use::RoughZ => approach.end[0] > approach.start[0] + SAME_MM,
+            // Passes across the axis go inward.
+            Use::RoughX => sight.direction(contour) > 0.0,
+            Use::Pattern | Use::Finish => false,
+        };
+        if is_inside {
             self.notes.fault(spot, "inside_turning");
             return Ok(None);
         }
-        if by == Use::RoughZ && self.refuse_not_monotone(contour) {
+        let is_roughed = matches!(by, Use::RoughZ | Use::RoughX);
+        if is_roughed && self.refuse_not_monotone(contour, sight) {
             return Ok(None);
         }
-        Ok(Some(contour.to_vec()))
+        Ok(Some((contour.to_vec(), sight)))
     }
 
-    /// The radius never falls and z goes one way: the first part that does otherwise is a fault.
-    fn refuse_not_monotone(&mut self, contour: &[Element]) -> bool {
-        let direction = direction(contour);
-        let turns = |one: &Element| {
-            one.end[0] < one.start[0] - SAME_MM
-                || (one.end[1] - one.start[1]) * direction < -SAME_MM
-                || one.arc.is_some_and(|(centre, path)| arcs::turns_back(one.start, one.end, centre, path))
-        };
-        let Some(at) = contour.iter().find(|one| turns(one)).map(|one| one.line - 1) else {
+    /// The first part of the contour that turns back is a fault.
+    fn refuse_not_monotone(&mut self, contour: &[Element], sight: Sight) -> bool {
+        let Some(at) = sight.turns_back(contour).map(|one| one.line - 1) else {
             return false;
         };
         let block = lexer::block(self.line(at), at + 1, self.dialect, &mut Notes::default());
@@ -257,111 +238,6 @@ impl<'a> Reader<'a> {
         self.notes.fault(spot, "contour_not_monotone");
         true
     }
-
-    /// Passes along the axis down to the contour, then one along it; all of it leaves the allowances.
-    fn passes(&mut self, contour: &[Element], spot: Spot<'a>, allowance: [f64; 2]) {
-        let line = spot.line;
-        let Some([x0, z0]) = self.state.place.known() else {
-            return;
-        };
-        let Some(depth) = self.state.rough_depth.filter(|depth| *depth > 0.0) else {
-            self.notes.fault(spot, "cycle_word_missing");
-            return;
-        };
-        let contour: Vec<Element> = contour.iter().map(|one| one.shifted(allowance)).collect();
-        let (Some(first), Some(last)) = (contour.first(), contour.last()) else {
-            return;
-        };
-        let (r0, direction, retract) = (0.5 * x0, direction(&contour), self.state.rough_retract);
-        let count = ((r0 - first.start[0] - SAME_MM) / depth).ceil() - 1.0;
-        if count > MAX_PASSES as f64 {
-            self.notes.fault_with(spot, "too_many_moves", |finding| finding.with("limit_moves", 4 * MAX_PASSES));
-            return;
-        }
-        // A pass reaches the first part that is as high as it.
-        let mut part = 0;
-        let mut hits = Vec::new();
-        // Below MAX_PASSES.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let count = count.max(0.0) as usize;
-        let radii: Vec<f64> = (1..=count).map(|i| r0 - depth * i as f64).collect();
-        for &r in radii.iter().rev() {
-            while part + 1 < contour.len() && contour[part].end[0] < r {
-                part += 1;
-            }
-            let one = &contour[part];
-            hits.push(if one.end[0] < r { last.end[1] } else { one.z_at(r) });
-        }
-        for (&r, &z) in radii.iter().zip(hits.iter().rev()) {
-            // What begins behind the start finds nothing to cut.
-            if (z - z0) * direction <= 0.0 {
-                continue;
-            }
-            let out = r + retract;
-            self.go(line, Kind::Rapid, Place::at(2.0 * r, z0), None);
-            self.go(line, Kind::Line, Place::at(2.0 * r, z), None);
-            self.go(line, Kind::Line, Place::at(2.0 * out, z - retract * direction), None);
-            self.go(line, Kind::Rapid, Place::at(2.0 * out, z0), None);
-        }
-        self.go(line, Kind::Rapid, Place::at(2.0 * first.start[0], z0), None);
-        self.follow(line, &contour);
-        self.go(line, Kind::Rapid, Place::at(x0, last.end[1]), None);
-        self.go(line, Kind::Rapid, Place::at(x0, z0), None);
-    }
-
-    /// Passes along the contour, each nearer to it; the last one leaves the allowances.
-    fn along_contour(&mut self, contour: &[Element], spot: Spot<'a>, allowance: [f64; 2]) {
-        let line = spot.line;
-        let Some([x0, z0]) = self.state.place.known() else {
-            return;
-        };
-        let [shift_r, shift_z, count] = self.state.pattern.unwrap_or([0.0, 0.0, 1.0]);
-        let passes = count.round().max(1.0);
-        if passes * contour.len() as f64 > MAX_PASSES as f64 {
-            self.notes.fault_with(spot, "too_many_moves", |finding| finding.with("limit_moves", MAX_PASSES));
-            return;
-        }
-        // Below MAX_PASSES.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let passes = passes as usize;
-        for pass in 0..passes {
-            let left = if passes > 1 { 1.0 - pass as f64 / (passes - 1) as f64 } else { 0.0 };
-            let shift = [allowance[0] + left * shift_r, allowance[1] + left * shift_z];
-            let shifted: Vec<Element> = contour.iter().map(|one| one.shifted(shift)).collect();
-            let (Some(first), Some(last)) = (shifted.first(), shifted.last()) else {
-                return;
-            };
-            let out = (2.0 * last.end[0]).max(x0);
-            self.go(line, Kind::Rapid, Place::at(2.0 * first.start[0], z0), None);
-            self.follow(line, &shifted);
-            self.go(line, Kind::Rapid, Place::at(out, last.end[1]), None);
-            self.go(line, Kind::Rapid, Place::at(out, z0), None);
-        }
-        self.go(line, Kind::Rapid, Place::at(x0, z0), None);
-    }
-
-    /// At the feed to the beginning of a contour and along it.
-    fn follow(&mut self, line: usize, contour: &[Element]) {
-        let point = |[r, z]: [f64; 2]| Place::at(2.0 * r, z);
-        if let Some(first) = contour.first() {
-            self.go(line, Kind::Line, point(first.start), None);
-        }
-        for one in contour {
-            match one.arc {
-                None => self.go(line, Kind::Line, point(one.end), None),
-                Some((centre, path)) => {
-                    let kind = if path == Path::Clockwise { Kind::ArcCw } else { Kind::ArcCcw };
-                    self.go(line, kind, point(one.end), Some([2.0 * centre[0], centre[1]]));
-                }
-            }
-        }
-    }
-}
-
-/// Which way a contour goes along the axis.
-fn direction(contour: &[Element]) -> f64 {
-    let ends = contour.first().zip(contour.last());
-    if ends.is_some_and(|(first, last)| last.end[1] > first.start[1]) { 1.0 } else { -1.0 }
 }
 
 /// Moves as parts; what does not begin and end at known places is none.

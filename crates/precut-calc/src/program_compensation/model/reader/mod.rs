@@ -1,7 +1,7 @@
 //! From the text of a program to its moves (`program/2`).
 //!
 //! `lines` -> `lexer` (words with their places) -> `block` (modal state, one block after another) -> `moves`; `codes` has what
-//! each control means by its words, `cycles` and `contour` expand what stands for many moves, `arcs` finds centres. Nothing is
+//! each control means by its words, `cycles`, `contour` and `passes` expand what stands for many moves, `arcs` finds centres. Nothing is
 //! guessed: what is not understood is a fault with its place, or, where it leaves the position known, passed with a warning.
 
 mod arcs;
@@ -14,6 +14,7 @@ mod hints;
 mod lexer;
 mod lines;
 mod moves;
+mod passes;
 mod state;
 mod words_of_line;
 

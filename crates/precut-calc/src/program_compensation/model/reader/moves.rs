@@ -138,6 +138,8 @@ pub(crate) struct Move {
 pub enum CycleKind {
     /// Roughing in passes along the axis.
     RoughZ,
+    /// Roughing in passes across the axis.
+    RoughX,
     /// Passes along the contour.
     Pattern,
     /// Finishing along the contour.

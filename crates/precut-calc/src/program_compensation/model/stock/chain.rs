@@ -70,6 +70,8 @@ impl Run {
 pub(crate) struct Chain {
     /// Shared with the chains that it was before, as far as they are the same.
     runs: Vec<Arc<Run>>,
+    /// No radius is larger, once that was asked for, mm.
+    highest_mm: OnceLock<f64>,
     /// Parts that a curve was held against so far.
     looked_at: usize,
 }
@@ -83,7 +85,8 @@ impl Chain {
             step_owner: None,
         });
         let parts: Vec<Part> = parts.collect();
-        Self { runs: parts.chunks(MOST).map(|run| Arc::new(Run::of(run.to_vec()))).collect(), looked_at: 0 }
+        let runs = parts.chunks(MOST).map(|run| Arc::new(Run::of(run.to_vec()))).collect();
+        Self { runs, highest_mm: OnceLock::new(), looked_at: 0 }
     }
 
     /// The parts from left to right.
@@ -96,13 +99,14 @@ impl Chain {
     /// The parts that lie between two places, wholly or not.
     pub(crate) fn parts_between(&self, from: f64, to: f64) -> impl Iterator<Item = &Part> {
         let runs = &self.runs[self.run_behind(from)..];
-        let parts = runs.iter().take_while(move |run| run.x0() < to).flat_map(|run| &run.parts);
-        parts.filter(move |part| part.piece.x1 > from && part.piece.x0 < to)
+        let first = runs.first().map_or(0, |run| run.parts.partition_point(|part| part.piece.x1 <= from));
+        let parts = runs.iter().flat_map(|run| &run.parts).skip(first);
+        parts.take_while(move |part| part.piece.x0 < to).filter(move |part| part.piece.x1 > from)
     }
 
     /// No radius is larger, mm.
     pub(crate) fn highest(&self) -> f64 {
-        self.runs.iter().map(|run| run.highest_mm).fold(0.0, f64::max)
+        *self.highest_mm.get_or_init(|| self.runs.iter().map(|run| run.highest_mm).fold(0.0, f64::max))
     }
 
     /// Both ends, mm.
@@ -222,6 +226,7 @@ impl Chain {
     /// Puts parts of a run in the place of others; those that are one with their neighbour become one. Gives the last run
     /// that has any of them.
     fn replace(&mut self, at: usize, range: std::ops::Range<usize>, made: &[Part]) -> usize {
+        self.highest_mm = OnceLock::new();
         let run = &self.runs[at];
         let mut joined: Vec<Part> = Vec::with_capacity(run.parts.len() + made.len());
         let (before, behind) = (&run.parts[..range.start], &run.parts[range.end..]);

@@ -1,10 +1,12 @@
 //! The work while it is turned, on work and machine that do not yield (`program/3`).
 //!
-//! `curve` (radii over the axis) -> `chain` (the outline, and who made which part) <- `sweep` (what a tool covers on its way);
-//! `rigid` drives a program over a blank.
+//! `curve` (radii over the axis) -> `chain` (the outline, and who made which part) <- `sweep` (what a tool covers on its way) and
+//! `edges` (where its edges end); `nose` is where a tool goes whose nose is compensated; `rigid` drives a program over a blank.
 
 mod chain;
 mod curve;
+mod edges;
+mod nose;
 mod rigid;
 mod sweep;
 

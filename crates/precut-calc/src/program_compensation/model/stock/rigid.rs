@@ -8,13 +8,17 @@ use super::super::super::job::{Job, KeepOut, ProgramStock, ProgramTool, StockRow
 use super::super::reader::{Kind, Nose, Program, ProgramMove};
 use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
-use super::sweep::{Shape, Way};
+use super::edges::EdgeEnds;
+use super::nose::{self, Compensated, Programmed};
+use super::sweep::{Shape, Swept, Way};
 
 /// Why a program is not driven over its blank.
 pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
 
 /// Lines that own so much of the surface finish, mm.
 pub(crate) const FINISHES_MM: f64 = 0.3;
+/// What stands above the end of an edge by less is not told, mm.
+const BEYOND_EDGE_MM: f64 = 0.01;
 /// An edge this steep is a wall.
 const WALL_DEG: f64 = 90.0;
 /// Multiplications of a move, and of it against a part of the outline, about.
@@ -34,6 +38,9 @@ pub(crate) struct Turned {
     pub(crate) hits: Vec<Hit>,
     /// Lines on which the trailing edge cuts into what the tip has left: how steep the way falls there, and that edge, deg.
     pub(crate) gouges: BTreeMap<usize, [f64; 2]>,
+    /// Lines whose cut goes on beyond the end of the edge: by how much the stock stands above that at the most, and the length
+    /// of the edge, mm.
+    pub(crate) beyond_edge: BTreeMap<usize, [f64; 2]>,
     /// Whether anything is cut.
     pub(crate) cuts: bool,
     /// The first cut along the axis: across it a cut may well be as deep as the work is thick.
@@ -173,21 +180,54 @@ pub(crate) struct Stroke<'p> {
     pub(crate) one: &'p ProgramMove,
     pub(crate) tool: &'p ProgramTool,
     pub(crate) shape: Shape,
+    /// Of the programmed point, were there no compensation of the nose.
     pub(crate) way: Way,
+    /// Shares of the programmed path beside which it begins and ends.
+    pub(crate) programmed: [f64; 2],
+}
+
+/// The tools of a program that are described, with their regions.
+fn tools_of<'p>(program: &Program, job: &'p Job) -> Vec<Option<(&'p ProgramTool, Shape)>> {
+    let described = |name: &String| job.tools.iter().find(|tool| tool.number == *name).map(|tool| (tool, shape(tool)));
+    program.tools.iter().map(described).collect()
+}
+
+/// Where the nose goes, of the moves of a program with compensation; empty where it has none. The line of a move that cannot be
+/// followed where there is one.
+fn compensated(program: &Program, job: &Job, zero: f64) -> Result<Vec<Option<Compensated>>, usize> {
+    if program.moves.iter().all(|one| one.nose == Nose::Off) {
+        return Ok(Vec::new());
+    }
+    let tools = tools_of(program, job);
+    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    let programmed = program.moves.iter().map(|one| {
+        let begin = std::mem::replace(&mut from, one.end.known());
+        let (_, shape) = one.tool.and_then(|tool| tools.get(tool as usize).copied().flatten())?;
+        Some(Programmed {
+            way: way(one, begin?, one.end.known()?, zero),
+            nose: one.nose,
+            radius: shape.nose,
+            centre: shape.centre,
+            tool: one.tool,
+        })
+    });
+    let programmed: Vec<Option<Programmed>> = programmed.collect();
+    nose::ways(&programmed).map_err(|at| program.moves.get(at).map_or(1, |one| one.line))
 }
 
 /// The moves of a program over a blank: those between known places, of tools that are described.
 pub(crate) fn strokes<'p>(program: &'p Program, job: &'p Job, zero: f64) -> impl Iterator<Item = Stroke<'p>> {
-    let tools: Vec<Option<(&ProgramTool, Shape)>> = program
-        .tools
-        .iter()
-        .map(|name| job.tools.iter().find(|tool| tool.number == *name).map(|tool| (tool, shape(tool))))
-        .collect();
+    let tools = tools_of(program, job);
+    // A program that cannot be followed is refused before anything is made of it.
+    let compensated = compensated(program, job, zero).unwrap_or_default();
     let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
     program.moves.iter().enumerate().filter_map(move |(index, one)| {
         let begin = std::mem::replace(&mut from, one.end.known());
         let (tool, shape) = one.tool.and_then(|tool| tools.get(tool as usize).copied().flatten())?;
-        Some(Stroke { index, one, tool, shape, way: way(one, begin?, one.end.known()?, zero) })
+        let as_programmed = || Some((way(one, begin?, one.end.known()?, zero), [0.0, 1.0]));
+        let beside = compensated.get(index).copied().flatten().map(|found| (found.way, found.programmed));
+        let (way, programmed) = beside.or_else(as_programmed)?;
+        Some(Stroke { index, one, tool, shape, way, programmed })
     })
 }
 
@@ -221,8 +261,8 @@ pub(crate) fn turned(
             Finding::new("tool_missing", "/tools").with("names", names).with("lines", lines),
         ));
     }
-    if let Some(one) = program.moves.iter().find(|one| one.kind.is_feed() && one.nose != Nose::Off) {
-        let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", one.line);
+    if let Err(line) = compensated(program, job, zero) {
+        let finding = Finding::new("nose_compensation_not_driven", "/nc_program").with("line", line);
         return Err(Failure::OutOfModel(finding));
     }
     let mut chain = blank(stock);
@@ -232,15 +272,20 @@ pub(crate) fn turned(
         in_stock: Vec::new(),
         hits: Vec::new(),
         gouges: BTreeMap::new(),
+        beyond_edge: BTreeMap::new(),
         cuts: false,
         first_cut: None,
     };
-    let mut kept_out: Vec<Chain> = job.keep_out.iter().map(cylinder).collect();
+    let mut kept_out: Vec<(Chain, Option<u32>)> =
+        job.keep_out.iter().map(|keep_out| (cylinder(keep_out), keep_out.support)).collect();
     let mut pace = Pace::new(monitor);
-    for Stroke { one, tool, shape, way, .. } in strokes(program, job, zero) {
+    for Stroke { index, one, tool, shape, way, .. } in strokes(program, job, zero) {
         pace.work(WORK_OF_MOVE * (1 + kept_out.len()) + chain.take_looked_at() * WORK_OF_PART)?;
-        for (place, kept_out) in kept_out.iter_mut().enumerate() {
-            let depth_mm = kept_out.depth_of(&shape, &way);
+        for (place, (kept_out, support)) in kept_out.iter_mut().enumerate() {
+            if support.is_some_and(|support| !job.acts(support, program.executed_at(index))) {
+                continue;
+            }
+            let depth_mm = kept_out.depth_of_tool(tool, &shape, &way);
             let is_told = turned.hits.iter().rev().take_while(|hit| hit.line == one.line).any(|hit| hit.place == place);
             if depth_mm > CONTACT_MM && !is_told {
                 turned.hits.push(Hit { line: one.line, place, depth_mm });
@@ -253,6 +298,13 @@ pub(crate) fn turned(
                 turned.in_stock.push(InStock { line: one.line, depth_mm });
             }
         } else if one.kind.is_feed() {
+            if let Some((ends, length_mm)) = EdgeEnds::of(tool, &shape).zip(tool.edge_length_mm) {
+                let beyond_mm = ends.beyond_mm(tool.tip_direction, &shape, &way, &mut chain);
+                if beyond_mm > BEYOND_EDGE_MM {
+                    let told = turned.beyond_edge.entry(one.line).or_insert([0.0, length_mm]);
+                    told[0] = told[0].max(beyond_mm);
+                }
+            }
             let depth_mm = chain.turn(&shape, &way, one.line);
             if depth_mm > CONTACT_MM {
                 if let Some(steepest) = shape.falls_behind(&way, tool.tip_direction == 4) {
@@ -295,11 +347,40 @@ impl Chain {
         shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// The same of a tool that ends where its edges do, where it says how long these are.
+    fn depth_of_tool(&mut self, tool: &ProgramTool, shape: &Shape, way: &Way) -> f64 {
+        match EdgeEnds::of(tool, shape) {
+            None => self.depth_of(shape, way),
+            Some(ends) => {
+                let covered = ends.covered(shape, way);
+                covered.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
+            }
+        }
+    }
+
     /// Cuts along a way; how deep the tool went.
     pub(crate) fn turn(&mut self, shape: &Shape, way: &Way, owner: usize) -> f64 {
         let swept = shape.sweep(way);
         // All of it in the work as it is before.
         let deepest = swept.pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max);
+        self.take_away(&swept, owner);
+        deepest
+    }
+
+    /// Cuts along a way, and does not say how deep.
+    pub(crate) fn cut_along(&mut self, shape: &Shape, way: &Way, owner: usize) {
+        self.take_away(&shape.sweep(way), owner);
+    }
+
+    /// Cuts along straight ways that follow each other.
+    pub(crate) fn cut_along_all(&mut self, shape: &Shape, ways: &[Way], owner: usize) {
+        match shape.sweep_all(ways) {
+            Some(swept) => self.take_away(&swept, owner),
+            None => ways.iter().for_each(|way| self.cut_along(shape, way, owner)),
+        }
+    }
+
+    fn take_away(&mut self, swept: &Swept, owner: usize) {
         for piece in &swept.pieces {
             for above in above_axis(piece) {
                 self.cut(&above, owner);
@@ -308,7 +389,6 @@ impl Chain {
         for &[x, from] in &swept.walls {
             self.touch_wall(x, from, owner);
         }
-        deepest
     }
 }
 

@@ -112,7 +112,7 @@ const ARC_SHARES: u32 = 36;
 const ACROSS: f64 = 1e-6;
 const SAME_SLOPE: f64 = 1e-9;
 /// An edge goes on as far as there is work, mm.
-const FAR_MM: f64 = 1e6;
+pub(super) const FAR_MM: f64 = 1e6;
 
 impl Shape {
     /// Unit normal below the nose where its slope is this: along x and r.
@@ -124,6 +124,12 @@ impl Shape {
     /// End of the nose toward a side, from its centre along x.
     fn reach(&self, edge: Option<f64>) -> f64 {
         self.nose * edge.map_or(1.0, |slope| Self::below(slope)[0])
+    }
+
+    /// Both ends of the nose from the programmed point, at the height of its centre, mm.
+    pub(super) fn sides(&self) -> [[f64; 2]; 2] {
+        let [x, r] = self.centre;
+        [[x - self.reach(self.left), r], [x + self.reach(self.right), r]]
     }
 
     fn has_slope(&self, slope: f64) -> bool {
@@ -154,6 +160,33 @@ impl Shape {
         Some(Piece { x0: ends[0][0], x1: ends[1][0], curve: Curve::through(ends[0], ends[1]) })
     }
 
+    /// From the programmed point to the place of the surface that a feed along the axis makes; none where neither the nose nor
+    /// the corner makes it.
+    pub(crate) fn makes(&self, [x, r]: [f64; 2]) -> Option<[f64; 2]> {
+        let slope = r / x;
+        (x.abs() > ACROSS && self.has_slope(slope)).then(|| self.support(slope))
+    }
+
+    /// How far from the programmed point, along the axis, its lower boundary rises by no more than so much: toward the headstock and
+    /// the other way, mm.
+    pub(crate) fn extent_mm(&self, by_mm: f64) -> [f64; 2] {
+        let x = self.centre[0];
+        let reach = |edge: Option<f64>| self.reach(edge) + edge.map_or(0.0, |slope| by_mm / slope);
+        [x - reach(self.left), x + reach(self.right)]
+    }
+
+    /// Its lower boundary over the programmed point, so far beside it along the axis, mm; none where it has none.
+    pub(crate) fn height_mm(&self, beside: f64) -> Option<f64> {
+        let by = beside - self.centre[0];
+        let edge = if by < 0.0 { self.left } else { self.right };
+        let reach = self.reach(edge);
+        if by.abs() <= reach {
+            return Some(self.centre[1] - (self.nose * self.nose - by * by).max(0.0).sqrt());
+        }
+        let slope = edge?;
+        Some(self.centre[1] + self.nose * Self::below(slope)[1] + (by.abs() - reach) * slope)
+    }
+
     /// What the way leaves.
     pub(crate) fn sweep(&self, way: &Way) -> Swept {
         let mut swept = Swept::default();
@@ -166,6 +199,44 @@ impl Shape {
             Way::Arc { centre, radius, from, turn } => self.sweep_arc((centre, radius), (from, turn), &mut swept),
         }
         swept
+    }
+
+    /// What straight ways leave that follow each other along the axis, one way of it: what no place of them makes alone is left out. None
+    /// where a way turns back or is steeper than an edge.
+    pub(crate) fn sweep_all(&self, ways: &[Way]) -> Option<Swept> {
+        let line = |way: &Way| match *way {
+            Way::Line(from, to) => Some([from, to]),
+            Way::Arc { .. } => None,
+        };
+        let mut lines: Vec<[[f64; 2]; 2]> = ways.iter().map(line).collect::<Option<_>>()?;
+        if lines.first().is_some_and(|[from, to]| from[0] > to[0]) {
+            lines.reverse();
+            for ends in &mut lines {
+                ends.reverse();
+            }
+        }
+        let slope = |[from, to]: &[[f64; 2]; 2]| (to[1] - from[1]) / (to[0] - from[0]);
+        let is_smooth = lines.iter().all(|ends| ends[1][0] > ends[0][0] && self.has_slope(slope(ends)));
+        let ends = lines.first().zip(lines.last()).filter(|_| is_smooth)?;
+        let mut swept = Swept::default();
+        self.stand(ends.0[0], &mut swept);
+        self.stand(ends.1[1], &mut swept);
+        swept.pieces.extend(lines.iter().filter_map(|[from, to]| self.line(&Way::Line(*from, *to))));
+        // Between two lines of which the second one rises more, the nose makes what lies between.
+        for pair in lines.windows(2) {
+            let slopes = [slope(&pair[0]), slope(&pair[1])];
+            if self.nose > 0.0 && slopes[0] < slopes[1] {
+                let [x, r] = pair[1][0];
+                let (cx, cr) = (x + self.centre[0], r + self.centre[1]);
+                let [x0, x1] = slopes.map(|slope| cx + self.nose * Self::below(slope)[0]);
+                swept.pieces.push(Piece {
+                    x0,
+                    x1,
+                    curve: Curve::Arc { x: cx, r: cr, radius: self.nose, is_upper: false },
+                });
+            }
+        }
+        Some(swept)
     }
 
     /// From the programmed point to what cuts where the slope is this.

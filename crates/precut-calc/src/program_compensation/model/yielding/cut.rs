@@ -6,6 +6,7 @@ use crate::force::{Component, DepthLaw, ForceModel};
 use super::super::super::job::ProgramTool;
 use super::super::reader::{Feed, Speed};
 use super::super::stock::{Chain, Stroke};
+use super::aim::Aim;
 use super::outline::{Engaged, Outline};
 
 /// Steps to the equilibrium at the most: halving alone needs fewer.
@@ -41,6 +42,8 @@ pub(crate) struct CutPlace {
     pub(crate) radial_force_n: f64,
     /// By how much the tool comes to stand off its path, mm.
     pub(crate) lift_mm: f64,
+    /// By how much it is meant to: 0, or what a corrected move is off the drawing, mm.
+    pub(crate) wanted_mm: f64,
     /// Beside corrected moves, at the ends of a move and where it cuts nothing: how far the tool may be set in there without
     /// touching what is left, mm.
     pub(crate) clear_mm: f64,
@@ -108,8 +111,10 @@ pub(crate) struct Cutting<'a> {
     pub(crate) real: &'a Chain,
     /// Whether the move goes on where the last one stopped cutting.
     pub(crate) goes_on: bool,
-    /// Whether the surface comes out as it is meant: then the depth is that at the nominal place.
+    /// Whether the surface comes out as it is meant: then the depth is that at the place that is meant.
     pub(crate) is_corrected: bool,
+    /// The drawing, where that is meant.
+    pub(crate) aim: Option<&'a Aim>,
 }
 
 /// Forces at a place, for any depth.
@@ -208,6 +213,11 @@ impl Cutting<'_> {
         }
     }
 
+    /// How far off its path the tool is meant to be, mm.
+    fn wanted_mm(&self, share: f64) -> f64 {
+        self.aim.filter(|_| self.is_corrected).map_or(0.0, |aim| aim.off_mm(self.stroke, share))
+    }
+
     /// What happens at a share of the move, at the depth that is met from `from` on; `place` is its number among those of the gaps.
     pub(crate) fn at(&self, (share, from): (f64, f64), gaps: &Gaps, place: usize) -> CutPlace {
         let [z_mm, radius_mm] = self.stroke.way.at(share);
@@ -222,6 +232,7 @@ impl Cutting<'_> {
             compliance_mm_per_n,
             radial_force_n: 0.0,
             lift_mm: lift_mm(radius_mm, gaps.opening(place, Push::default())),
+            wanted_mm: self.wanted_mm(share),
             clear_mm: 0.0,
             load: None,
         };
@@ -245,9 +256,10 @@ impl Cutting<'_> {
             let push = loaded.push(engaged);
             (lift_mm(radius_mm, gaps.opening(place, push)), engaged.depth_mm, push.radial_n)
         };
-        let (lift_mm, depth_mm, radial_force_n) = if self.is_corrected { at(0.0) } else { equilibrium(at) };
+        let wanted_mm = still.wanted_mm;
+        let (lift_mm, depth_mm, radial_force_n) = if self.is_corrected { at(wanted_mm) } else { equilibrium(at) };
         let load = (self.with_loads && depth_mm > 0.0).then(|| {
-            let lift = if self.is_corrected { 0.0 } else { lift_mm };
+            let lift = if self.is_corrected { wanted_mm } else { lift_mm };
             let engaged = outline.engaged(self.real, [met_z_mm, met_radius_mm + lift]);
             loaded.load(engaged, feed_mm_per_rev, rpm)
         });

@@ -3,12 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::calculator::{self, Failure, Finding, Monitor};
-use crate::deflection_compensation::{FeedDirection, Holding, Support, Theory, ToolPlace};
+use crate::deflection_compensation::{FeedDirection, Holding, Support, Theory};
 use crate::force::ForceModel;
 
 use super::super::super::job::{Job, ProgramStock};
-use super::super::reader::{Kind, Program};
+use super::super::reader::{Kind, Program, ProgramMove};
 use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
+use super::aim::Aim;
+use super::along::{Along, SoFar, after};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
 use super::sections::{Lumps, slices};
 
@@ -17,12 +19,6 @@ pub(crate) const FAILURE_CODES: &[&str] = &["speed_missing", "supports_do_not_ho
 
 /// How far between two places of a move the path may come off a straight line, mm: of one that finishes, of any other.
 const STRAIGHT_MM: [f64; 2] = [3e-5, 3e-4];
-/// Places stand no farther apart than this at first, mm.
-const APART_MM: f64 = 5.0;
-/// On an arc no farther than by this angle, rad: the edge turns against the surface.
-const APART_RAD: f64 = std::f64::consts::PI / 180.0;
-/// And no nearer than this where the path jumps, mm.
-const NEAREST_MM: f64 = 0.01;
 /// A chip thinner than this is none, mm.
 const CHIP_MM: f64 = 1e-7;
 /// A rapid move that stays farther off is told nothing of, mm.
@@ -31,14 +27,11 @@ const NEAR_MM: f64 = 1.0;
 /// mm of its way.
 pub(crate) const CLOSE_MM: f64 = 0.1;
 const COMES_OFF_MM: f64 = 1.0;
-/// Most places at the beginning, and in all.
-const MOST_AT_FIRST: f64 = 400.0;
-const MOST_PLACES: usize = 4000;
-/// Steps of the stock that get places of their own.
-const MOST_STEPS: usize = 200;
 /// A cut that is meant is deeper, and a move through the air that is told longer, mm.
 const MEANT_MM: f64 = 1e-3;
 const AIR_MM: f64 = 20.0;
+/// So many moves before the first one that makes the contour may change with it.
+const MOVES_BEFORE: usize = 3;
 /// The work is as its outline has it so far beside the tool, mm.
 const BESIDE_MM: f64 = 1.0;
 /// Multiplications for a place of a move.
@@ -64,13 +57,15 @@ pub(crate) struct Driven<'a> {
     pub(crate) corrected: &'a BTreeSet<usize>,
     /// What some moves leave instead of their own way: the work bends as these leave it.
     pub(crate) bends_as: Option<&'a Instead>,
+    /// A drive of a program that is no other one before its first line of the contour: it need not be driven again until there.
+    pub(crate) goes_on: Option<&'a Yielded>,
 }
 
 /// Ways of a tool instead of those of moves, by the moves.
 pub(crate) type Instead = BTreeMap<usize, Vec<(Shape, Way)>>;
 
 /// What a program leaves where work and machine yield.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Yielded {
     /// Places of the moves that cut, in the order of the program.
     pub(crate) places: Vec<PlaceOfMove>,
@@ -80,7 +75,7 @@ pub(crate) struct Yielded {
     pub(crate) close: Vec<Clearance>,
     /// What each move that cuts along the axis asks of the force law.
     pub(crate) cuts: Vec<CutMove>,
-    /// What is left, and what would be, did nothing yield.
+    /// What is left, and what is meant to be: what would be, did nothing yield, or the drawing.
     pub(crate) real: Vec<Part>,
     pub(crate) nominal: Vec<Part>,
     /// Lines that cut in another direction than the force law was measured in.
@@ -89,6 +84,32 @@ pub(crate) struct Yielded {
     pub(crate) missed_lines: BTreeSet<usize>,
     /// Long moves at the feed that cut nothing and do not mean to.
     pub(crate) in_air: Vec<InAir>,
+    /// Where it stood before its first line of the contour.
+    start: Option<Box<Start>>,
+}
+
+/// Where a drive stands between two moves.
+#[derive(Debug, Clone)]
+struct State {
+    meant: Meant,
+    real: Chain,
+    so_far: SoFar,
+    /// The last move that was still cutting when it ended.
+    last_cut: Option<usize>,
+    was_feed: bool,
+}
+
+/// Where a drive stood before its first line of the contour.
+#[derive(Debug, Clone)]
+struct Start {
+    /// The move that comes next.
+    index: usize,
+    state: State,
+    /// How many places, rapid moves, cuts and ways through the air there were.
+    counts: [usize; 4],
+    close: Vec<Clearance>,
+    turned_lines: BTreeSet<usize>,
+    missed_lines: BTreeSet<usize>,
 }
 
 /// What a move along the axis asks of the force law: depth where it is deepest, did nothing yield, feed and speed where it begins
@@ -119,6 +140,7 @@ pub(crate) struct Clearance {
 }
 
 /// The work as the section of the beam has it: before and after a move that does not yield.
+#[derive(Debug, Clone)]
 struct Meant {
     before: Chain,
     after: Chain,
@@ -129,21 +151,10 @@ impl Meant {
     fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
         self.before.clone_from(&self.after);
         match bends_as.and_then(|ways| ways.get(&stroke.index)) {
-            Some(ways) => ways.iter().for_each(|(shape, way)| {
-                self.after.turn(shape, way, stroke.one.line);
-            }),
-            None => {
-                self.after.turn(&stroke.shape, &stroke.way, stroke.one.line);
-            }
+            Some(ways) => ways.iter().for_each(|(shape, way)| self.after.cut_along(shape, way, stroke.one.line)),
+            None => self.after.cut_along(&stroke.shape, &stroke.way, stroke.one.line),
         }
     }
-}
-
-/// Path and time in the cut so far.
-#[derive(Debug, Clone, Copy, Default)]
-struct SoFar {
-    path_m: f64,
-    time_min: f64,
 }
 
 /// Drives a program over a blank that yields.
@@ -155,29 +166,21 @@ pub(crate) fn yielding(
     driven: Driven<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Yielded, Failure> {
-    let mut meant = Meant { before: blank(stock), after: blank(stock) };
-    let mut real = blank(stock);
-    let mut yielded = Yielded {
-        places: Vec::new(),
-        rapids: Vec::new(),
-        close: Vec::new(),
-        cuts: Vec::new(),
-        real: Vec::new(),
-        nominal: Vec::new(),
-        turned_lines: BTreeSet::new(),
-        missed_lines: BTreeSet::new(),
-        in_air: Vec::new(),
-    };
-    let mut so_far = SoFar::default();
-    // The last move that was still cutting when it ended.
-    let mut last_cut: Option<usize> = None;
+    let resumed = driven.goes_on.and_then(|before| before.start.as_deref().map(|start| before.up_to(start)));
+    let is_whole = resumed.is_none();
+    let (mut yielded, mut state, from) = resumed.unwrap_or_else(|| (Yielded::default(), State::of(stock), 0));
+    let mut kept_at = is_whole.then(|| begins_at(program, driven.finishing));
+    let aim = Aim::of(job, || rigid(program, job, (stock, zero)));
     let mut pace = calculator::Pace::new(monitor);
-    let mut was_feed = false;
-    for stroke in strokes(program, job, zero) {
+    for stroke in strokes(program, job, zero).filter(|stroke| stroke.index >= from) {
+        if kept_at.take_if(|at| stroke.index >= *at).is_some() {
+            yielded.start = Some(Box::new(yielded.start_at(stroke.index, state.clone())));
+        }
+        let State { meant, real, so_far, last_cut, was_feed } = &mut state;
         let Stroke { one, shape, way, .. } = &stroke;
-        let comes_off = std::mem::replace(&mut was_feed, one.kind.is_feed());
+        let comes_off = std::mem::replace(was_feed, one.kind.is_feed());
         if one.kind == Kind::Rapid {
-            yielded.find_close(&stroke, &mut real, comes_off);
+            yielded.find_close(&stroke, real, comes_off);
             let gap_mm = -real.depth_of(shape, way);
             if gap_mm < NEAR_MM {
                 yielded.rapids.push(Clearance { line: one.line, mv: stroke.index, gap_mm });
@@ -200,7 +203,7 @@ pub(crate) fn yielding(
             return Err(refused("speed_missing", one.line));
         }
         let bore_mm = stock.bore_diameter_mm;
-        let lumps = lumps(holding, &meant, way);
+        let lumps = lumps(holding, meant, way);
         let held =
             holding.hold(&slices(&meant.before, &meant.after, bore_mm, lumps.as_ref()), &acts, direction(way))?;
         let cutting = Cutting {
@@ -210,26 +213,26 @@ pub(crate) fn yielding(
             with_main: holding.tangential,
             with_loads: job.mode.kind.refeeds(),
             nominal: &meant.before,
-            real: &real,
-            goes_on: last_cut == stroke.index.checked_sub(1),
+            real,
+            goes_on: *last_cut == stroke.index.checked_sub(1),
             is_corrected: driven.corrected.contains(&stroke.index),
+            aim: aim.as_ref(),
         };
         let is_corrected = cutting.is_corrected;
         let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
         let from = cutting.meets_from();
-        let along = Along { cutting, way, from, so_far, move_pace, straight_mm };
+        let along = Along { cutting, way, from, so_far: *so_far, move_pace, straight_mm };
         let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
-        if is_corrected {
-            real.turn(shape, way, one.line);
+        if is_corrected && aim.is_none() {
+            real.cut_along(shape, way, one.line);
         } else {
+            let off = |place: &CutPlace| if is_corrected { place.wanted_mm } else { place.lift_mm };
             let lifted: Vec<Way> = places
                 .windows(2)
-                .map(|pair| way.lifted([pair[0].share, pair[1].share], [pair[0].lift_mm, pair[1].lift_mm]))
+                .map(|pair| way.lifted([pair[0].share, pair[1].share], [off(&pair[0]), off(&pair[1])]))
                 .collect();
-            for way in &lifted {
-                real.turn(shape, way, one.line);
-            }
+            real.cut_along_all(shape, &lifted, one.line);
         }
         if !driven.corrected.is_empty() {
             let is_end = |place: &CutPlace| place.share <= 0.0 || place.share >= 1.0;
@@ -238,19 +241,28 @@ pub(crate) fn yielding(
                 place.clear_mm = -real.depth_of(shape, &Way::Line(at, at));
             }
         }
-        so_far = after(so_far, way, move_pace);
+        *so_far = after(*so_far, way, move_pace);
         yielded.cuts.extend(asked(way, move_pace, &places));
         let is_turned = places.iter().any(|place| place.depth_mm > 0.0) && climbs(way);
         if is_turned && !matches!(holding.force, ForceModel::Kienzle(_)) {
             yielded.turned_lines.insert(one.line);
         }
         let (line, mv) = (one.line, stroke.index);
-        last_cut = places.last().filter(|place| place.depth_mm > 0.0).map(|_| mv);
+        *last_cut = places.last().filter(|place| place.depth_mm > 0.0).map(|_| mv);
         yielded.places.extend(places.into_iter().map(|place| PlaceOfMove { line, mv, place }));
     }
-    yielded.real = real.parts();
-    yielded.nominal = meant.after.parts();
+    yielded.real = state.real.parts();
+    yielded.nominal = aim.map_or_else(|| state.meant.after.parts(), Aim::into_meant);
     Ok(yielded)
+}
+
+/// What a program leaves on rigid work.
+fn rigid(program: &Program, job: &Job, (stock, zero): (&ProgramStock, f64)) -> Vec<Part> {
+    let mut chain = blank(stock);
+    for stroke in strokes(program, job, zero).filter(|stroke| stroke.one.kind.is_feed()) {
+        chain.cut_along(&stroke.shape, &stroke.way, stroke.one.line);
+    }
+    chain.parts()
 }
 
 /// Where the work bends as a few slices do: everywhere but about the tool, unless its weight counts, or
@@ -283,7 +295,52 @@ fn asked(way: &Way, pace: Pace, places: &[CutPlace]) -> Option<CutMove> {
     })
 }
 
+/// The first move of a line that makes the contour, less a few: how the moves before it end may change with it.
+fn begins_at(program: &Program, finishing: &[usize]) -> usize {
+    let is_first = |one: &ProgramMove| finishing.binary_search(&one.line).is_ok();
+    program.moves.iter().position(is_first).unwrap_or(0).saturating_sub(MOVES_BEFORE)
+}
+
+impl State {
+    fn of(stock: &ProgramStock) -> Self {
+        let meant = Meant { before: blank(stock), after: blank(stock) };
+        Self { meant, real: blank(stock), so_far: SoFar::default(), last_cut: None, was_feed: false }
+    }
+}
+
 impl Yielded {
+    /// The moves before its first line of the contour, as far as they are kept.
+    pub(crate) fn moves_before_contour(&self) -> usize {
+        self.start.as_ref().map_or(0, |start| start.index)
+    }
+
+    fn start_at(&self, index: usize, state: State) -> Start {
+        Start {
+            index,
+            state,
+            counts: [self.places.len(), self.rapids.len(), self.cuts.len(), self.in_air.len()],
+            close: self.close.clone(),
+            turned_lines: self.turned_lines.clone(),
+            missed_lines: self.missed_lines.clone(),
+        }
+    }
+
+    /// The drive as it was at its start, and the move that comes next.
+    fn up_to(&self, start: &Start) -> (Self, State, usize) {
+        let [places, rapids, cuts, in_air] = start.counts;
+        let found = Self {
+            places: self.places[..places].to_vec(),
+            rapids: self.rapids[..rapids].to_vec(),
+            close: start.close.clone(),
+            cuts: self.cuts[..cuts].to_vec(),
+            turned_lines: start.turned_lines.clone(),
+            missed_lines: start.missed_lines.clone(),
+            in_air: self.in_air[..in_air].to_vec(),
+            ..Self::default()
+        };
+        (found, start.state.clone(), start.index)
+    }
+
     /// Keeps a rapid move that comes close to the work; where a cut has just ended, once it had to be off.
     fn find_close(&mut self, stroke: &Stroke<'_>, real: &mut Chain, comes_off: bool) {
         let length_mm = stroke.way.length_mm();
@@ -321,13 +378,7 @@ fn refused(code: &'static str, line: usize) -> Failure {
 
 /// Which of the supports act in a line.
 fn acts(job: &Job, line: usize) -> Vec<bool> {
-    let is_there = |i: usize| {
-        let mut told = job.support_lines.iter().filter(|told| told.support as usize == i);
-        told.all(|told| {
-            told.from_line.is_none_or(|from| from as usize <= line) && told.to_line.is_none_or(|to| line <= to as usize)
-        })
-    };
-    (0..job.supports.len()).map(is_there).collect()
+    (0_u32..).zip(&job.supports).map(|(support, _)| job.acts(support, line)).collect()
 }
 
 fn direction(way: &Way) -> FeedDirection {
@@ -339,113 +390,4 @@ fn direction(way: &Way) -> FeedDirection {
 fn climbs(way: &Way) -> bool {
     let steep = |share: f64| way.direction(share).is_some_and(|[x, r]| r.atan2(x.abs()).abs() > TURNED_RAD);
     [0.0, 0.5, 1.0].into_iter().any(steep)
-}
-
-/// Path and time after a way.
-fn after(so_far: SoFar, way: &Way, pace: Pace) -> SoFar {
-    let radius_mm = way.at(0.5)[1].max(AXIS_MM);
-    let Some(feed) = pace.feed_mm_per_rev(radius_mm) else { return so_far };
-    let turns = way.length_mm() / feed;
-    let time_min = pace.rpm(radius_mm).filter(|rpm| *rpm > 0.0).map_or(0.0, |rpm| turns / rpm);
-    SoFar {
-        path_m: so_far.path_m + 2.0 * std::f64::consts::PI * radius_mm * turns / 1000.0,
-        time_min: so_far.time_min + time_min,
-    }
-}
-
-/// A move along which places are laid.
-struct Along<'a> {
-    cutting: Cutting<'a>,
-    way: &'a Way,
-    /// Share from which on the depth is what the tool meets.
-    from: f64,
-    so_far: SoFar,
-    move_pace: Pace,
-    straight_mm: f64,
-}
-
-impl Along<'_> {
-    /// Places, so close that between them the path is straight.
-    fn places(&self) -> Result<Vec<CutPlace>, Failure> {
-        let mut places = self.at(&self.first_shares())?;
-        // Whether what lies behind a place may still be bent.
-        let mut is_open = vec![true; places.len()];
-        let nearest = NEAREST_MM / self.way.length_mm();
-        while places.len() < MOST_PLACES {
-            let wanted: Vec<usize> = (1..places.len())
-                .filter(|&i| is_open[i - 1] && places[i].share - places[i - 1].share > nearest)
-                .collect();
-            if wanted.is_empty() {
-                break;
-            }
-            let shares: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].share + places[i].share)).collect();
-            let found = self.at(&shares)?;
-            let (mut laid, mut open) = (Vec::new(), Vec::new());
-            let mut next = wanted.iter().zip(&found).peekable();
-            for (i, place) in places.iter().enumerate() {
-                if let Some((_, between)) = next.next_if(|(at, _)| **at == i) {
-                    let before: &CutPlace = &places[i - 1];
-                    let bent = (between.lift_mm - 0.5 * (before.lift_mm + place.lift_mm)).abs() > self.straight_mm;
-                    if let Some(last) = open.last_mut() {
-                        *last = bent;
-                    }
-                    laid.push(*between);
-                    open.push(bent);
-                }
-                laid.push(*place);
-                open.push(is_open[i] && next.peek().is_some_and(|(at, _)| **at == i + 1));
-            }
-            (places, is_open) = (laid, open);
-        }
-        Ok(places)
-    }
-
-    /// Evenly, and on both sides of every step of the stock.
-    fn first_shares(&self) -> Vec<f64> {
-        let length = self.way.length_mm();
-        let turned = if let Way::Arc { turn, .. } = self.way { turn.abs() } else { 0.0 };
-        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(4.0, MOST_AT_FIRST);
-        // At most MOST_AT_FIRST.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let whole = count as usize;
-        let mut shares: Vec<f64> = (0..=whole).map(|i| i as f64 / count).collect();
-        let [from, to] = self.way.ends();
-        let (low, high) = (from[0].min(to[0]), from[0].max(to[0]));
-        if let Way::Line(..) = self.way
-            && high - low > NEAREST_MM
-        {
-            let stock: &Chain = self.cutting.nominal;
-            let steps = stock.parts_between(low, high).flat_map(|part| [part.piece.x0, part.piece.x1]);
-            for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
-                shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
-            }
-        }
-        shares.retain(|share| (0.0..=1.0).contains(share));
-        shares.sort_by(f64::total_cmp);
-        let nearest = 0.5 * NEAREST_MM / length;
-        let last = shares.last().copied();
-        shares.dedup_by(|later, kept| *later - *kept <= nearest);
-        if let (Some(kept), Some(last)) = (shares.last_mut(), last) {
-            *kept = last;
-        }
-        shares
-    }
-
-    fn at(&self, shares: &[f64]) -> Result<Vec<CutPlace>, Failure> {
-        let whole = after(self.so_far, self.way, self.move_pace);
-        let between = |from: f64, to: f64, share: f64| from + share * (to - from);
-        let place = |&share: &f64| {
-            let [z_mm, radius_mm] = self.way.at(share);
-            ToolPlace {
-                z_mm,
-                radius_mm: radius_mm.max(AXIS_MM),
-                path_m: between(self.so_far.path_m, whole.path_m, share),
-                time_min: between(self.so_far.time_min, whole.time_min, share),
-                planned: self.cutting.planned(share, self.from),
-            }
-        };
-        let places: Vec<ToolPlace> = shares.iter().map(place).collect();
-        let gaps = self.cutting.held.gaps(&places)?;
-        Ok(shares.iter().enumerate().map(|(i, &share)| self.cutting.at((share, self.from), &gaps, i)).collect())
-    }
 }

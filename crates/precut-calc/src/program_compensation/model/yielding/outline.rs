@@ -10,6 +10,12 @@ use super::super::stock::{Chain, Curve, Shape};
 const AHEAD_MM: f64 = 1e-6;
 /// No edge is longer, mm.
 const LONGEST_MM: f64 = 1e4;
+/// So far beside the outline stock is looked at, mm.
+const NEAR_MM: f64 = 1e-6;
+/// As many marks along an outline take no second allocation.
+const MARKS: usize = 64;
+/// A point beside the outline by a larger share of its distance is not on it, whatever rounding does, 1.
+const BESIDE: f64 = 1e-9;
 /// A direction this flat is none, 1.
 const FLAT: f64 = 1e-12;
 
@@ -74,11 +80,13 @@ impl Outline {
     pub(crate) fn engaged(&self, stock: &Chain, [x, r]: [f64; 2]) -> Engaged {
         let centre = [x + self.centre[0] + AHEAD_MM * self.feed[0], r + self.centre[1] + AHEAD_MM * self.feed[1]];
         let tip = [centre[0] + self.nose * self.normal[0], centre[1] + self.nose * self.normal[1]];
-        let placed = Placed::of(self, centre, stock);
-        let mut marks = vec![0.0, placed.end];
+        let mut placed = Placed::of(self, centre, stock);
+        placed.end_above(stock);
+        let mut marks = Vec::with_capacity(MARKS);
+        marks.extend([0.0, placed.end]);
         placed.crossings(stock, &mut marks);
         marks.retain(|mark| (0.0..=placed.end).contains(mark));
-        marks.sort_by(f64::total_cmp);
+        marks.sort_unstable_by(f64::total_cmp);
         let is_inside = |pair: &&[f64]| {
             let [px, pr] = placed.at(0.5 * (pair[0] + pair[1]));
             pair[1] - pair[0] > FLAT && stock_at(stock, px).is_some_and(|radius| pr < radius)
@@ -122,6 +130,8 @@ struct Placed {
     edge: [f64; 2],
     along: [f64; 2],
     end: f64,
+    /// Directions from the centre of the nose to both of its ends.
+    ends: [[f64; 2]; 2],
 }
 
 impl Placed {
@@ -141,7 +151,8 @@ impl Placed {
         } else if along[0] < -FLAT {
             length = length.min((first_x - edge[0]).min(0.0) / along[0]);
         }
-        Self { centre, nose, from, sense, lead, edge, along, end: nose * lead + length + 1e-3 }
+        let ends = [outline.normal, at_edge];
+        Self { centre, nose, from, sense, lead, edge, along, end: nose * lead + length + 1e-3, ends }
     }
 
     fn at(&self, length: f64) -> [f64; 2] {
@@ -154,32 +165,82 @@ impl Placed {
         [self.edge[0] + beyond * self.along[0], self.edge[1] + beyond * self.along[1]]
     }
 
+    /// Ends the outline where it has come above all stock that it reaches: what lies beyond is in none.
+    fn end_above(&mut self, stock: &Chain) {
+        let ([low, high], _) = self.extent();
+        let highest = stock.parts_between(low, high).map(|part| part.piece.highest()).fold(0.0, f64::max) + NEAR_MM;
+        let of_nose = self.nose * self.lead;
+        if self.along[1] <= FLAT {
+            return;
+        }
+        if self.edge[1] < highest {
+            self.end = self.end.min(of_nose + (highest - self.edge[1]) / self.along[1]);
+            return;
+        }
+        self.end = of_nose;
+        // From the lowest point of the nose on it only rises.
+        let below = self.centre[1] - highest;
+        let lowest = self.sense_to(-FRAC_PI_2);
+        let lowest = if lowest > PI { lowest - 2.0 * PI } else { lowest };
+        if below > 0.0 && below < self.nose && lowest < self.lead {
+            self.end = self.end.min(self.nose * (lowest + (below / self.nose).acos())).max(0.0);
+        }
+    }
+
+    /// Both ends of the outline along the axis, and its lowest radius. What lies beside it, as all that the moves before have made
+    /// behind the tip, or below it, is not looked at.
+    fn extent(&self) -> ([f64; 2], f64) {
+        let is_on_nose = self.end < self.nose * self.lead;
+        let last = self.at(self.end);
+        let (mut low, mut high, mut lowest) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+        for [x, r] in [self.at(0.0), if is_on_nose { last } else { self.edge }, last] {
+            (low, high, lowest) = (low.min(x), high.max(x), lowest.min(r));
+        }
+        // The nose goes on to its ends along the axis and to its lowest point, where the outline comes by them.
+        let turned = if is_on_nose { self.end / self.nose } else { self.lead };
+        let has = |angle: f64| self.sense_to(angle) < turned;
+        if has(PI) {
+            low = low.min(self.centre[0] - self.nose);
+        }
+        if has(0.0) {
+            high = high.max(self.centre[0] + self.nose);
+        }
+        if has(-FRAC_PI_2) {
+            lowest = lowest.min(self.centre[1] - self.nose);
+        }
+        ([low - NEAR_MM, high + NEAR_MM], lowest - NEAR_MM)
+    }
+
+    /// How far the outline has turned at an angle, rad.
+    fn sense_to(&self, angle: f64) -> f64 {
+        (self.sense * (angle - self.from)).rem_euclid(2.0 * PI)
+    }
+
     /// Lengths at which the outline may go into the stock or out of it.
     fn crossings(&self, stock: &Chain, into: &mut Vec<f64>) {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for x in [self.edge[0], self.at(self.end)[0]] {
-            (low, high) = (low.min(x), high.max(x));
-        }
-        if self.nose > 0.0 {
-            (low, high) = (low.min(self.centre[0] - self.nose), high.max(self.centre[0] + self.nose));
-        }
+        let ([low, high], lowest) = self.extent();
         into.push(self.nose * self.lead);
-        let mut found = Vec::new();
-        for part in stock.parts_between(low - 1e-6, high + 1e-6) {
+        let mut found = Vec::with_capacity(2);
+        let mut last = f64::NEG_INFINITY;
+        for part in stock.parts_between(low, high).filter(|part| part.piece.highest() >= lowest) {
             let piece = part.piece;
+            // Where the part before ends, it has been looked at.
             for x in [piece.x0, piece.x1] {
-                self.at_place(x, piece.curve, into);
+                if x > last {
+                    self.at_place(x, into);
+                }
+                last = last.max(x);
             }
+            self.at_curve(piece.curve, into);
             let within = [piece.x0, piece.x1];
             if self.nose > 0.0 {
-                for is_upper in [false, true] {
-                    let [x, r] = self.centre;
-                    let half = Curve::Arc { x, r, radius: self.nose, is_upper };
-                    found.clear();
-                    half.crossings(piece.curve, 0.0, within, &mut found);
-                    for &x in &found {
-                        self.push_angle([x, piece.curve.at(x)], into);
-                    }
+                // Its other half has the same crossings.
+                let [x, r] = self.centre;
+                let nose = Curve::Arc { x, r, radius: self.nose, is_upper: false };
+                found.clear();
+                nose.crossings(piece.curve, 0.0, within, &mut found);
+                for &x in &found {
+                    self.push_angle([x, piece.curve.at(x)], into);
                 }
             }
             if self.along[0].abs() > FLAT {
@@ -192,8 +253,8 @@ impl Placed {
         }
     }
 
-    /// Where the outline passes a place along the axis, or, of an edge that stands on it, the curve there.
-    fn at_place(&self, x: f64, curve: Curve, into: &mut Vec<f64>) {
+    /// Where the outline passes a place along the axis.
+    fn at_place(&self, x: f64, into: &mut Vec<f64>) {
         let beside = x - self.centre[0];
         if beside.abs() < self.nose {
             let half = (self.nose * self.nose - beside * beside).sqrt();
@@ -201,18 +262,27 @@ impl Placed {
                 self.push_angle([x, r], into);
             }
         }
-        let of_nose = self.nose * self.lead;
         if self.along[0].abs() > FLAT {
-            into.push(of_nose + (x - self.edge[0]) / self.along[0]);
+            into.push(self.nose * self.lead + (x - self.edge[0]) / self.along[0]);
         }
+    }
+
+    /// Where an edge that stands on the axis passes a curve.
+    fn at_curve(&self, curve: Curve, into: &mut Vec<f64>) {
         if self.along[1].abs() > FLAT && self.along[0].abs() <= 1e-3 {
-            into.push(of_nose + (curve.at(self.edge[0]) - self.edge[1]) / self.along[1]);
+            into.push(self.nose * self.lead + (curve.at(self.edge[0]) - self.edge[1]) / self.along[1]);
         }
     }
 
     fn push_angle(&self, point: [f64; 2], into: &mut Vec<f64>) {
-        let angle = (point[1] - self.centre[1]).atan2(point[0] - self.centre[0]);
-        let turned = (self.sense * (angle - self.from)).rem_euclid(2.0 * PI);
+        let to = [point[0] - self.centre[0], point[1] - self.centre[1]];
+        // An outline turns by less than half a circle: most points are seen to be none of its nose without their angle.
+        let beside = |a: [f64; 2], b: [f64; 2]| self.sense * (a[0] * b[1] - a[1] * b[0]) < -BESIDE * self.nose;
+        if beside(self.ends[0], to) || beside(to, self.ends[1]) {
+            return;
+        }
+        let angle = to[1].atan2(to[0]);
+        let turned = self.sense_to(angle);
         if turned < self.lead {
             into.push(self.nose * turned);
         }
