@@ -2,7 +2,7 @@
 
 use crate::calculator::{Finding, Message};
 use crate::fixture_stability::{
-    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, Friction, STATED_FREQUENCY, STATED_RATIO,
+    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, Friction, FrictionRange, STATED_FREQUENCY, STATED_RATIO,
 };
 
 use super::super::job::{Asked, EdgeForce, Job, modes, way};
@@ -210,7 +210,7 @@ fn of_spindle(study: &Study<'_>, outcome: &Outcome, found: &mut Vec<Finding>) {
 
 fn of_clamping(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     let (Some(clamping), Some(told)) = (&job.clamping, &outcome.clamping) else { return Vec::new() };
-    let Friction { low, high, .. } = Friction::ASSUMED;
+    let FrictionRange { low, high, .. } = Friction::ASSUMED.range();
     let assumed = clamping.frictions().into_iter().filter(|(_, friction)| *friction == Friction::ASSUMED);
     let mut found: Vec<Finding> = assumed
         .take(1)

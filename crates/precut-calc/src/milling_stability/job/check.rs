@@ -35,6 +35,7 @@ pub(in crate::milling_stability) const CODES: &[&str] = &[
     "vise_or_contacts",
     "frictions_unordered",
     "nothing_clamped",
+    "friction_range_or_sd",
     "clamping_unbalanced",
     "bad_clamp_force",
     "vise_not_modal",

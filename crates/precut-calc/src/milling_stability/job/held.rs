@@ -5,7 +5,7 @@ use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::clamping::{Contact, Fixture, Rest, Unheld, Vector, Vise};
-use crate::fixture_stability::Friction;
+use crate::fixture_stability::{Friction, FrictionRange};
 
 use super::input::{DirectionPart, number};
 
@@ -202,7 +202,7 @@ impl PartClamping {
                     jaw_height_mm: of.jaw_height_mm,
                     part_width_mm: of.part_width_mm,
                     parallels: of.parallels,
-                    friction: of.friction.low,
+                    friction: of.friction.range().low,
                     constant_force: of.constant_force,
                     weight_n,
                     centre_of_mass_mm,
@@ -220,11 +220,11 @@ impl PartClamping {
     /// What the kernel takes, or why the part does not stand; `None` of a job that is refused for its fields.
     pub(in crate::milling_stability) fn held(&self) -> Option<Result<Held, Unheld>> {
         let fixture = self.fixture()?;
-        let of = |pick: fn(&Friction) -> f64| -> Vec<f64> {
+        let of = |pick: fn(&FrictionRange) -> f64| -> Vec<f64> {
             match (&self.vise, &self.contacts) {
-                (Some(vise), _) => vec![pick(&vise.friction); fixture.contacts.len()],
+                (Some(vise), _) => vec![pick(&vise.friction.range()); fixture.contacts.len()],
                 (None, Some(of)) => {
-                    of.points.iter().map(|point| pick(point.friction.as_ref().unwrap_or(&of.friction))).collect()
+                    of.points.iter().map(|point| pick(&point.friction.unwrap_or(of.friction).range())).collect()
                 }
                 (None, None) => Vec::new(),
             }
@@ -254,7 +254,7 @@ impl GrippingPoint {
         Some(Contact {
             position_mm: vector(&self.position_mm)?,
             normal: self.direction()?,
-            friction: self.friction.unwrap_or(usual).low,
+            friction: self.friction.unwrap_or(usual).range().low,
             normal_stiffness_n_per_mm: self.normal_stiffness_n_per_mm,
             tangential_stiffness_n_per_mm: self.tangential_stiffness_n_per_mm,
             clamp_share: self.clamp_share,
