@@ -9,7 +9,8 @@ mod job;
 pub mod model;
 
 pub use answer::output::{
-    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampTurn, ClampingStatus, ContactUse,
+    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
+    ContactUse,
     CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind, LeadingMultiplier, LobeIntervals,
     MillingBoundary, MillingClamping, MillingCost, MillingEngagement, MillingForces, MillingLobes, MillingMap,
     MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, PocketLimit, ProposalKind,
@@ -42,7 +43,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction; edges may be helical, pitches, helices and run-out \
@@ -208,7 +209,8 @@ fn cost(job: &Job) -> Cost {
         parts.push((if is_slow { SLOW_MOTION_MS } else { solved }, "/cut/spindle_speed_rpm"));
     }
     let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
-    let clamping_ms = clamping.map_or(0.0, |of| (1.0 + of.stations.len() as f64) * CLAMPING_MS + 0.5 * here);
+    let places = |of: &PartClamping| of.places_mm(job.cut.feed_direction_deg).map_or(1, |places| places.len()) as f64;
+    let clamping_ms = clamping.map_or(0.0, |of| places(of) * CLAMPING_MS + 0.5 * here);
     if clamping.is_some() {
         parts.push((clamping_ms, "/clamping/stations"));
     }

@@ -9,7 +9,7 @@ use super::super::job::{Asked, EdgeForce, Job, modes, way};
 use super::super::model::Law;
 use super::clamping::is_enough;
 use super::output::{
-    ClampCriterion, ClampRemedyKind, CutterProposal, ForceOfSide, InstabilityKind, LeadingMultiplier, MillingClamping,
+    ClampCriterion, ClampRemedyKind, ClampStation, CutterProposal, ForceOfSide, InstabilityKind, LeadingMultiplier, MillingClamping,
     MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
 };
 use super::proposals::effort;
@@ -74,6 +74,7 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "milling_unstable_throughout",
     "side_limits",
     "both_sides_limit",
+    "clamping_along_the_feed",
     "direction_limits",
     "milling_pushes",
     "milling_lifts",
@@ -461,6 +462,7 @@ fn of_sides(limited: &RigidLimits, outcome: &Outcome) -> Vec<Message> {
     // Of several directions the one whose stiffening gains most.
     let gained = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
     if let Some((axis, value)) =
+    said.extend(along_the_feed(clamping));
         tried.iter().max_by(|a, b| gained(a.1).total_cmp(&gained(b.1))).filter(|_| tried.len() > 1)
         && gained(*value) > (1.0 + SAME) * limit
     {
@@ -472,6 +474,28 @@ fn of_sides(limited: &RigidLimits, outcome: &Outcome) -> Vec<Message> {
     }
     said
 }
+/// Over which way the cut was taken to go where the job does not say it, and where on it most is asked.
+fn along_the_feed(clamping: &MillingClamping) -> Option<Message> {
+    if !clamping.stations_assumed {
+        return None;
+    }
+    let message = Message::new("clamping_along_the_feed");
+    let apart = |a: &ClampStation, b: &ClampStation| (a.x_mm - b.x_mm).hypot(a.y_mm - b.y_mm);
+    let all = &clamping.stations;
+    let pairs = all.iter().enumerate().flat_map(|(i, from)| all[i + 1..].iter().map(move |to| (from, to)));
+    let Some((from, to)) = pairs.max_by(|(a, b), (c, d)| apart(a, b).total_cmp(&apart(c, d))) else {
+        return Some(message);
+    };
+    let message =
+        message.with("x1_mm", from.x_mm).with("y1_mm", from.y_mm).with("x2_mm", to.x_mm).with("y2_mm", to.y_mm);
+    let force = |of: &ClampStation| of.clamp_force_min_n.unwrap_or(f64::INFINITY);
+    let most = all.iter().max_by(|a, b| force(a).total_cmp(&force(b)))?;
+    Some(match most.clamp_force_min_n {
+        Some(asked) => message.with("x_mm", most.x_mm).with("y_mm", most.y_mm).with("asked_n", rounded_up(asked)),
+        None => message,
+    })
+}
+
 
 /// The best speeds, or that there is none.
 fn of_speeds(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {

@@ -79,7 +79,7 @@ impl<'a> Study<'a> {
         let examined_mm = examined_mm(job, &case, zeroth);
         let torque_at_1_mm_n_m = statics(&case.milling, 1.0, monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
         let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
-        let held = clamping.and_then(|clamping| clamping.held()?.ok());
+        let held = clamping.and_then(|clamping| clamping.held(job.cut.feed_direction_deg)?.ok());
         let is_slow = case.cut().is_slow();
         Ok(Self {
             job,

@@ -586,6 +586,10 @@ pub struct ClampDeciding {
     pub rotation_deg: f64,
     /// What fails first.
     pub criterion: ClampCriterion,
+    /// Places of the cut, in the order in which they are numbered, and what each asks for.
+    pub stations: Vec<ClampStation>,
+    /// Whether the job states no place but the first, so that the ends of the way along the feed were taken.
+    pub stations_assumed: bool,
 }
 
 /// What fails at a contact.
@@ -616,6 +620,23 @@ pub struct ContactUse {
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub x_mm: f64,
     /// Along Y.
+/// A place of the cut.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ClampStation {
+    /// Where, along X of the fixture.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub x_mm: f64,
+    /// Along Y.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub y_mm: f64,
+    /// Along Z.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: f64,
+    /// Least clamp force that holds while the cut acts there; null where none holds.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_min_n: Option<f64>,
+}
+
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub y_mm: f64,
     /// Along Z.

@@ -219,7 +219,7 @@ fn check_clamping(job: &Job, violations: &mut Violations) {
             Finding::new("direction_zero", format!("/clamping/contacts/points/{index}/normal"))
         });
     }
-    match clamping.held() {
+    match clamping.held(job.cut.feed_direction_deg) {
         Some(Err(Unheld::NothingClamped)) => {
             violations.add(Finding::new("nothing_clamped", "/clamping/contacts/points"));
         }
