@@ -206,7 +206,7 @@ fn the_reference_functions_are_taken_in_every_form() {
         solve(&job).outcome
     };
     let (csv, uff) = (job("frf-P01.csv"), job("frf-P01-ascii.uff"));
-    for (of, hz) in csv.modes.iter().zip([456.787_495_695_891_5, 1448.891_774_767_629_8]) {
+    for (of, hz) in csv.modes.iter().zip([456.787_495_695_891_5, 1_448.891_774_767_629_8]) {
         assert!(near(of.frequency_hz, hz, 1e-5), "{of:?}");
     }
     // The ASCII file has 11 digits.

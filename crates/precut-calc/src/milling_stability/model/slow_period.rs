@@ -38,11 +38,6 @@ const PER_TRIAL: usize = 200;
 const TRIALS: usize = 6;
 
 impl SlowMultiplier {
-    /// Whether a disturbance grows: from tooth to tooth, or fifty times between two.
-    pub fn grows(&self) -> bool {
-        self.counted().modulus() >= 1.0
-    }
-
     /// The multiplier; where the growth between two teeth over fifty is larger, one of that size.
     pub fn counted(&self) -> Multiplier {
         let size = (self.within / GROWN / self.multiplier.modulus().max(f64::MIN_POSITIVE)).max(1.0);
