@@ -89,6 +89,7 @@ mod machinability_real;
 mod material_library;
 mod milling_answers;
 mod milling_clamping;
+mod milling_receptances;
 mod milling_reference;
 mod path_chords;
 mod process_figures;

@@ -1,5 +1,5 @@
 //! The clamp force that a milled part asks for: what is told of it is done, against cuts put together here.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)]
 
 use std::f64::consts::TAU;
 
@@ -46,7 +46,7 @@ fn the_mean_force_across_the_feed_is_held_as_by_hand() {
         "tool": { "kind": "rigid" }, "work": { "kind": "rigid" },
         "clamping": { "vise": { "jaw_length_mm": 100, "jaw_height_mm": 30, "part_width_mm": 60,
                                 "friction": { "low": 0.2, "value": 0.25, "high": 0.4 } },
-                      "cut_point_mm": [0, 0, 15] },
+                      "cut_point_mm": [0, 0, 15], "stations": [{ "x_mm": 0, "y_mm": 0, "z_mm": 15 }] },
         "analyses": ["clamping"]
     });
     let told = solve(&job);
@@ -76,6 +76,8 @@ fn on_work(job: &Value, rotation: f64) -> Vector {
     let (entry, exit) = (number(job, "/cut/entry_deg").to_radians(), number(job, "/cut/exit_deg").to_radians());
     let (depth, feed) = (number(job, "/cut/depth_mm"), number(job, "/cut/feed_mm_per_tooth"));
     let lag = number(job, "/cutter/helix_angle_deg").to_radians().tan() / radius;
+    let law = ["tangential", "radial", "axial"]
+        .map(|name| [of(&format!("{name}_edge_n_per_mm")), of(&format!("{name}_n_per_mm2"))]);
     let mut sum = [0.0; 3];
     let mut tooth = 0.0;
     while tooth < teeth {
@@ -84,10 +86,7 @@ fn on_work(job: &Value, rotation: f64) -> Vector {
             let phi = (rotation - tooth * TAU / teeth - lag * height).rem_euclid(TAU);
             if phi > entry && phi < exit {
                 let (s, c) = phi.sin_cos();
-                let along = |edge: &str, cutting: &str| (of(edge) + of(cutting) * feed * s) * depth / f64::from(SLICES);
-                let t = along("tangential_edge_n_per_mm", "tangential_n_per_mm2");
-                let r = along("radial_edge_n_per_mm", "radial_n_per_mm2");
-                let a = along("axial_edge_n_per_mm", "axial_n_per_mm2");
+                let [t, r, a] = law.map(|[edge, cutting]| (edge + cutting * feed * s) * depth / f64::from(SLICES));
                 // The tool is pushed by -t e_t - r e_r, the workpiece the other way; a lifts it.
                 sum[0] += t * c + r * s;
                 sum[1] += r * c - t * s;
@@ -333,7 +332,8 @@ fn the_state_is_what_hurts_first() {
     let lifting = |mass: f64| {
         let light = json!({
             "force": { "tangential_n_per_mm2": 300, "radial_n_per_mm2": 0, "axial_n_per_mm2": 900, "radial_edge_n_per_mm": 0 },
-            "clamping": { "vise": { "clamp_force_n": 1e5 }, "cut_point_mm": [0, 0, 15], "stations": null, "part_mass_kg": mass,
+            "clamping": { "vise": { "clamp_force_n": 1e5 }, "cut_point_mm": [0, 0, 15],
+                          "stations": [{ "x_mm": 0, "y_mm": 0, "z_mm": 15 }], "part_mass_kg": mass,
                           "centre_of_mass_mm": [0, 0, 15] }
         });
         solve(&merged(job.clone(), &light))
@@ -409,6 +409,99 @@ fn an_unlikely_clamp_force_and_a_friction_that_is_not_stated_are_warned_of() {
         solve(&job).warns("jaw_friction_assumed")
     };
     assert!(warns(Value::Null) && !warns(json!({ "low": 0.1, "value": 0.15, "high": 0.21 })));
+}
+
+/// A job that states one place of the cut is that of the way along the feed through it: as stated, what each place asks for is what
+/// it asks alone, and the largest is the least that holds.
+#[test]
+fn a_cut_without_stations_goes_along_the_feed() {
+    let free = |patch: Value| {
+        let mut job = merged(example("clamped"), &merged(json!({ "analyses": ["clamping"] }), &patch));
+        job["clamping"].as_object_mut().unwrap().remove("stations");
+        job
+    };
+    let contacts: Vec<Value> = [(-40.0, -30.0), (40.0, -30.0), (-40.0, 30.0), (40.0, 30.0)]
+        .iter()
+        .map(|(x, y): &(f64, f64)| json!({ "position_mm": [x, y, 10.0], "normal": [0.0, -y.signum(), 0.0], "clamp_share": 0.5 }))
+        .collect();
+    for (patch, ways) in [
+        // Over the length of the jaws, between them, slantwise to the nearer side, between contacts.
+        (json!({ "clamping": { "cut_point_mm": [0, 20, 40] } }), [[-50.0, 20.0], [0.0, 20.0], [50.0, 20.0]]),
+        (
+            json!({ "clamping": { "cut_point_mm": [10, 0, 40] }, "cut": { "feed_direction_deg": -90 } }),
+            [[10.0, 30.0], [10.0, 0.0], [10.0, -30.0]],
+        ),
+        (
+            json!({ "clamping": { "cut_point_mm": [0, 0, 40] }, "cut": { "feed_direction_deg": 45 } }),
+            [[-30.0, -30.0], [0.0, 0.0], [30.0, 30.0]],
+        ),
+        (
+            json!({ "clamping": { "vise": null, "contacts": { "points": contacts, "clamp_force_n": 9000 }, "cut_point_mm": [5, 0, 15] } }),
+            [[-40.0, 0.0], [0.0, 0.0], [40.0, 0.0]],
+        ),
+    ] {
+        let job = free(patch);
+        let told = solve(&job);
+        let clamping = told.outcome.clamping.as_ref().unwrap();
+        assert!(clamping.stations_assumed && told.says("clamping_along_the_feed"));
+        let has = |way: &[f64; 2]| {
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+            clamping.stations.iter().any(|at| near(at.x_mm, way[0]) && near(at.y_mm, way[1]))
+        };
+        assert!(ways.iter().all(has), "{ways:?} {:?}", clamping.stations);
+        let mut stated = job.clone();
+        let place = |at: &precut_calc::milling_stability::ClampStation| json!({ "x_mm": at.x_mm, "y_mm": at.y_mm, "z_mm": at.z_mm });
+        stated["clamping"]["stations"] = clamping.stations.iter().map(place).collect();
+        let other = solve(&stated);
+        assert!(!other.outcome.clamping.as_ref().unwrap().stations_assumed && !other.says("clamping_along_the_feed"));
+        let least = clamping.clamp_force_min_n.unwrap();
+        close(other.outcome.clamping.unwrap().clamp_force_min_n.unwrap(), least, 1e-12, "stated");
+        let mut most: f64 = 0.0;
+        for at in &clamping.stations {
+            let mut alone = job.clone();
+            alone["clamping"]["cut_point_mm"] = json!([at.x_mm, at.y_mm, at.z_mm]);
+            alone["clamping"]["stations"] = json!([place(at)]);
+            let asked = solve(&alone).outcome.clamping.unwrap().clamp_force_min_n.unwrap();
+            // One place has its own instants, between which the force asked for has its maximum.
+            close(at.clamp_force_min_n.unwrap(), asked, 1e-3, "alone");
+            most = most.max(at.clamp_force_min_n.unwrap());
+        }
+        close(most, least, 1e-9, "largest");
+    }
+    // A place beside the jaws: nothing tells the way.
+    let beside = solve(&free(json!({ "clamping": { "cut_point_mm": [0, 60, 40] } })));
+    assert_eq!(beside.outcome.clamping.as_ref().unwrap().stations.len(), 1);
+    assert!(beside.says("clamping_along_the_feed"));
+}
+
+/// A friction by its standard deviation is that of the ends between which nine of ten lie; by its likely value alone it is known; the
+/// force goes as its inverse.
+#[test]
+fn a_friction_may_be_stated_by_its_standard_deviation() {
+    let job = merged(example("clamped"), &json!({ "analyses": ["clamping"], "clamping": { "part_mass_kg": 0 } }));
+    let with = |friction: Value| {
+        let mut other = job.clone();
+        other["clamping"]["vise"]["friction"] = friction;
+        other
+    };
+    let forces = |friction: Value| {
+        let clamping = solve(&with(friction)).outcome.clamping.unwrap();
+        [clamping.clamp_force_min_n, clamping.at_likely_friction_n, clamping.at_high_friction_n].map(Option::unwrap)
+    };
+    let (value, sd): (f64, f64) = (0.2, 0.04);
+    let [low, likely, high] = forces(json!({ "value": value, "sd": sd }));
+    // Lognormal of that deviation: 1.644854 standard deviations of the logarithm to either side.
+    let off = (1.644_853_627 * (1.0 + (sd / value).powi(2)).ln().sqrt()).exp();
+    let [by_low, by_likely, by_high] = forces(json!({ "low": value / off, "value": value, "high": value * off }));
+    for (a, b) in [(low, by_low), (likely, by_likely), (high, by_high)] {
+        close(a, b, 1e-8, "standard deviation");
+    }
+    assert!(low > likely && likely > high);
+    let [low, likely, high] = forces(json!({ "value": value }));
+    assert!(low == likely && likely == high && !solve(&with(json!({ "value": value }))).warns("jaw_friction_assumed"));
+    let found = faults(&with(json!({ "value": value, "low": 0.1, "sd": sd })));
+    let named: Vec<_> = found.iter().map(|fault| (fault.code, fault.pointer.as_str())).collect();
+    assert_eq!(named, [("friction_range_or_sd", "/clamping/vise/friction/sd")]);
 }
 
 /// Better speeds keep within the clamp force at hand: done as printed it holds.

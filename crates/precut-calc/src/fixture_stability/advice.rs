@@ -4,7 +4,7 @@ use crate::calculator::{Finding, Message};
 
 use super::answer::{Aside, NEAR_LIMIT, Settling, Study};
 use super::conformance;
-use super::input::{Analysis, Friction, Spindle};
+use super::input::{Analysis, Friction, FrictionRange, Spindle};
 use super::output::{ChatterKind, ClampForce, FirstLimit, FixtureOutcome, FixtureState, OpenJoint};
 use super::plausible::implausible;
 use super::probable_depths;
@@ -137,7 +137,7 @@ pub(super) fn warnings(study: &Study<'_>, outcome: &FixtureOutcome, aside: &Asid
         found.push(Finding::new("motion_beyond_model", "/fixture").measured(swing_mm, model_mm, "mm"));
     }
     if job.fixture.grip().is_some_and(|grip| grip.friction == Friction::ASSUMED) {
-        let Friction { low, high, .. } = Friction::ASSUMED;
+        let FrictionRange { low, high, .. } = Friction::ASSUMED.range();
         found.push(Finding::new("friction_assumed", "/fixture/clamp/friction").with("low", low).with("high", high));
     }
     if let Some(slip) = outcome.clamp.as_ref().and_then(|clamp| clamp.slip.as_ref())

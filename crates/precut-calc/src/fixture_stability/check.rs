@@ -5,7 +5,7 @@ use crate::effects::FixtureEffect as Effect;
 
 use super::acting::Case;
 use super::cutting::engagement_rad;
-use super::input::{FixtureJob, Friction, MAX_MAP_POINTS, SpindlePoint, Vise};
+use super::input::{FixtureJob, Friction, FrictionRange, MAX_MAP_POINTS, SpindlePoint, Vise};
 use super::uncertain;
 
 /// Codes of the faults found here, and those that fields name for their range.
@@ -32,6 +32,7 @@ pub(super) const CODES: &[&str] = &[
     "runout_beyond_feed",
     "jaw_face_missing",
     "frictions_unordered",
+    "friction_range_or_sd",
 ];
 
 /// S and S_z that both are given may differ by so much.
@@ -76,9 +77,12 @@ fn check_cut(job: &FixtureJob, violations: &mut Violations) {
     }
 }
 
-/// What is known of a friction stands in order.
+/// What is known of a friction stands in order, and once.
 pub(crate) fn check_friction(friction: Friction, at: &str, violations: &mut Violations) {
-    let Friction { low, value, high } = friction;
+    let FrictionRange { low, value, high } = friction.range();
+    let has_range = friction.low.is_some() || friction.high.is_some();
+    violations
+        .require(!has_range || friction.sd.is_none(), || Finding::new("friction_range_or_sd", format!("{at}/sd")));
     violations.require(low <= value && value <= high, || {
         Finding::new("frictions_unordered", at).with("low", low).with("value", value).with("high", high)
     });

@@ -5,6 +5,7 @@ use utoipa::openapi::schema::OneOfBuilder;
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::certainty::normal_quantile;
 use crate::effects::{FixtureConditions, FixtureEffect};
 use crate::force::choice;
 
@@ -218,24 +219,61 @@ pub struct JawGrip {
     pub jaw_height_mm: Option<f64>,
 }
 
-/// What is known of a friction. Forces are told for all three; the one that counts is that of the lowest.
+/// What is known of a friction: the likely one, with the lowest and highest that may be met or its standard deviation. Forces are told
+/// for all three; the one that counts is that of the lowest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Friction {
-    /// The lowest that may be met.
+    /// The lowest that may be met; left out, it follows from the standard deviation, and without one it is the likely one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.001, maximum = 2.0, example = 0.1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu_low"))))]
-    pub low: f64,
+    pub low: Option<f64>,
     /// The likely one.
     #[schema(minimum = 0.001, maximum = 2.0, example = 0.15, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu"))))]
     pub value: f64,
-    /// The highest.
+    /// The highest; left out, as the lowest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.001, maximum = 2.0, example = 0.2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("mu_high"))))]
+    pub high: Option<f64>,
+    /// Standard deviation, in place of lowest and highest: these are then the ends between which nine of ten lie, lognormal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1.0, example = 0.03, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("s_mu"))))]
+    pub sd: Option<f64>,
+}
+
+/// Lowest, likely and highest friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FrictionRange {
+    pub low: f64,
+    pub value: f64,
     pub high: f64,
 }
 
+/// Share of the frictions that lies below the lowest, and as much above the highest.
+const BEYOND: f64 = 0.05;
+
 impl Friction {
     /// Ground steel jaws, dry: a judgement, and warned of.
-    pub(crate) const ASSUMED: Self = Self { low: 0.1, value: 0.15, high: 0.2 };
+    pub(crate) const ASSUMED: Self = Self { low: Some(0.1), value: 0.15, high: Some(0.2), sd: None };
+
+    /// As stated, or by the standard deviation. Of a job that states both the range counts; it is refused.
+    pub(crate) fn range(&self) -> FrictionRange {
+        // Standard deviation of the logarithm that makes this one.
+        let scatter = self.sd.map_or(0.0, |sd| (sd / self.value).powi(2).ln_1p().sqrt());
+        let off = (-scatter * normal_quantile(BEYOND)).exp();
+        FrictionRange {
+            low: self.low.unwrap_or(self.value / off),
+            value: self.value,
+            high: self.high.unwrap_or(self.value * off),
+        }
+    }
+}
+
+impl FrictionRange {
+    /// Standard deviation of the logarithm; `None` of one that is known exactly.
+    pub(crate) fn scatter(&self) -> Option<f64> {
+        (self.high > self.low).then(|| (self.high / self.low).ln() / (-2.0 * normal_quantile(BEYOND)))
+    }
 }
 
 impl Default for Friction {

@@ -64,6 +64,7 @@ pub use output::{
 pub(crate) use check::{check_characteristic, check_friction};
 pub(crate) use cutting::engagement_rad;
 pub(crate) use drive::power_kw;
+pub(crate) use input::FrictionRange;
 pub(crate) use plausible::{CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
 pub use probable_depths::{ProbableDepths, RobustSpeed};
 pub use uncertain::{FixtureCorrelation, FixtureQuantity, FixtureUncertainQuantity, FixtureUncertainty};
@@ -91,7 +92,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 10,
+        version: 11,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \

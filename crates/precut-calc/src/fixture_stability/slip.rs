@@ -10,7 +10,7 @@ use crate::clamping::{against_slip_n, friction_needed};
 use super::acting::Case;
 use super::cutting::{Cutting, Stretch};
 use super::floquet::Working;
-use super::input::{Friction, JawGrip};
+use super::input::{FrictionRange, JawGrip};
 use super::response::{Moment, Response};
 
 /// Jaws that press with the clamp force each: N_1 + N_2 is so many times it.
@@ -21,7 +21,7 @@ const SAME_ANGLE_RAD: f64 = 1e-9;
 /// How the jaws hold what pushes along them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grip {
-    pub friction: Friction,
+    pub friction: FrictionRange,
     /// 1 + (h/r_e)^2.
     pub couple: f64,
 }
@@ -31,7 +31,7 @@ impl Grip {
     pub(super) fn new(grip: &JawGrip) -> Self {
         let face = grip.jaw_length_mm.zip(grip.jaw_height_mm);
         let lever = face.map_or(0.0, |(length, height)| grip.force_height_mm / mean_distance_mm(length, height));
-        Self { friction: grip.friction, couple: 1.0 + lever * lever }
+        Self { friction: grip.friction.range(), couple: 1.0 + lever * lever }
     }
 }
 

@@ -7,6 +7,7 @@ use nalgebra::Complex;
 use crate::calculator::{Failure, Monitor, checkpoint};
 use crate::num::dde::{Matrix, SlowPeriod, product};
 use crate::num::quadrature::gauss_legendre;
+use crate::num::roots::aberth;
 
 use super::cutting::Cutting;
 use super::floquet::{Multiplier, Working, damped};
@@ -24,9 +25,6 @@ const PLACES: usize = 16;
 pub(super) const GROWN: f64 = 50.0;
 /// A growth beyond this, as a logarithm, is told as this.
 const FAR: f64 = 690.0;
-/// Steps to the roots of a characteristic equation, and how near is enough of their size.
-const ROOT_STEPS: u32 = 60;
-const NEAR_ROOT: f64 = 1e-11;
 
 /// Whether a cut is slow at a spindle speed. Joints that harden answer to the motion: they are not.
 pub(super) fn is_slow(holding: &Holding, cutting: &Cutting, spindle_rpm: f64) -> bool {
@@ -77,38 +75,18 @@ impl<const N: usize> Characteristic<N> {
         found
     }
 
-    /// All roots at once (Aberth).
+    /// All roots at once.
     fn roots(&self, coupling: Complex<f64>, mut at: [Complex<f64>; N]) -> [Complex<f64>; N] {
         let coefficients: [Complex<f64>; N] =
             std::array::from_fn(|j| Complex::new(self.own[j], 0.0) + coupling * self.coupled[j]);
-        for _ in 0..ROOT_STEPS {
-            let mut moved: f64 = 0.0;
-            for i in 0..N {
-                let (mut value, mut slope) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
-                for coefficient in coefficients.iter().rev() {
-                    slope = slope * at[i] + value;
-                    value = value * at[i] + coefficient;
-                }
-                if value.norm_sqr() <= 0.0 {
-                    continue;
-                }
-                let mut away = slope / value;
-                for j in 0..N {
-                    let apart = at[i] - at[j];
-                    if j != i && apart.norm_sqr() > 0.0 {
-                        away -= apart.inv();
-                    }
-                }
-                let step = away.inv();
-                if step.re.is_finite() && step.im.is_finite() {
-                    at[i] -= step;
-                    moved = moved.max(step.norm() / at[i].norm().max(1e-3));
-                }
+        aberth(&mut at, |s| {
+            let (mut value, mut slope) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
+            for coefficient in coefficients.iter().rev() {
+                slope = slope * s + value;
+                value = value * s + coefficient;
             }
-            if moved < NEAR_ROOT {
-                break;
-            }
-        }
+            (value.norm_sqr() > 0.0).then(|| slope / value)
+        });
         at
     }
 

@@ -6,12 +6,12 @@ use utoipa::ToSchema;
 use crate::calculator::{Finding, Violations};
 use crate::certainty::{
     Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
-    check_correlations, check_quantities, normal_quantile,
+    check_correlations, check_quantities,
 };
 
 use super::acting::Case;
 use super::holding::Joint;
-use super::input::{FixtureJob, Friction, Vise};
+use super::input::{FixtureJob, Vise};
 
 /// Standard deviation of the logarithm of what nobody states.
 const JOINT_STIFFNESS: f64 = 0.10;
@@ -20,8 +20,6 @@ const CUTTING_FORCE: f64 = 0.10;
 const SET_BY_HAND: f64 = 0.15;
 const SET_BY_PRESSURE: f64 = 0.05;
 const FRICTION: f64 = 0.20;
-/// Share of the frictions that lies below the lowest, and as much above the highest.
-const BEYOND: f64 = 0.05;
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &["quantity_of_nothing"];
@@ -214,17 +212,12 @@ fn pairs(stated: &FixtureUncertainty) -> Vec<Pair<'_, FixtureQuantity>> {
 fn usual(job: &FixtureJob) -> Vec<(FixtureQuantity, f64)> {
     use FixtureQuantity::{ClampForce, CuttingForce, Damping, Friction, JointStiffness};
     let set = if matches!(job.fixture, Vise::SelfLocking(_)) { SET_BY_HAND } else { SET_BY_PRESSURE };
-    let friction = job.fixture.grip().map_or(FRICTION, |grip| scatter(grip.friction));
+    let friction = job.fixture.grip().and_then(|grip| grip.friction.range().scatter()).unwrap_or(FRICTION);
     let mut all =
         vec![(JointStiffness, JOINT_STIFFNESS), (Damping, DAMPING), (CuttingForce, CUTTING_FORCE), (ClampForce, set)];
     all.push((Friction, friction));
     all.retain(|(quantity, _)| quantity.missing_in(job).is_none());
     all
-}
-
-/// Standard deviation of the logarithm of a friction: lowest and highest hold nine of ten between them.
-fn scatter(Friction { low, high, .. }: Friction) -> f64 {
-    if high > low { (high / low).ln() / (-2.0 * normal_quantile(BEYOND)) } else { FRICTION }
 }
 
 /// The vise where the quantities come to this.

@@ -9,17 +9,18 @@ mod job;
 pub mod model;
 
 pub use answer::output::{
-    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampTurn, ClampingStatus, ContactUse,
-    CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind, LeadingMultiplier, LobeIntervals,
-    MillingBoundary, MillingClamping, MillingCost, MillingEngagement, MillingForces, MillingLobes, MillingMap,
-    MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, PocketLimit, ProposalKind,
-    RigidLimits, SpeedCurve, SpeedPocket, SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
+    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
+    ContactUse, CrossingMethod, CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind,
+    LeadingMultiplier, LobeIntervals, MeasuredSide, MillingBoundary, MillingClamping, MillingCost, MillingEngagement,
+    MillingForces, MillingLobes, MillingMap, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions,
+    Outcome, PocketLimit, ProposalKind, ReceptanceLimit, RigidLimits, SpeedCurve, SpeedPocket, SpeedStatus,
+    UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 pub use job::{
-    Asked, Coordinate, Cut, CutLimits, CutStation, Cutter, DirectionPart, EdgeForce, FlankRubbing, GrippingContacts,
-    GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle, Milling, NothingYields,
-    PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
-    YieldingMode, YieldingModes, YieldingVise,
+    Asked, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing,
+    GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle,
+    Milling, NothingYields, PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset,
+    ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 
 use crate::calculator::{
@@ -27,8 +28,10 @@ use crate::calculator::{
     Place, Table, checkpoint,
 };
 
+use crate::receptance_fit::{FAILURE_CODES, FAULT_CODES, ReceptanceFit, WARNING_CODES as FIT_WARNING_CODES};
+
 use answer::{Study, advice, outcome, picture};
-use job::{Case, range_rpm};
+use job::{Case, fits, guessed, range_rpm, too_expensive};
 use model::MOST_OSCILLATIONS;
 
 /// The calculator.
@@ -42,10 +45,10 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 3,
+        version: 4,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
-        summary: "Tool and workpiece yield by modes in any direction; edges may be helical, pitches, helices and run-out \
+        summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \
                   uneven, and the spindle speed may vary. From that: the Floquet multiplier with its frequencies, every \
                   stretch of depths that is unstable with certified ends, the lobe diagram with its islands, which side and \
                   direction limits (solved with each held rigid), forces, torque and power, the forced motion and the \
@@ -54,6 +57,7 @@ impl Calculator for MillingStability {
             "Altintas, Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362",
             "Insperger, Stepan, Updated semi-discretization method for periodic delay-differential equations with discrete delay, Int. J. Numer. Meth. Engng 61 (2004) 117-141",
             "Zatarain, Munoa, Peigne, Insperger, Analysis of the influence of mill helix angle on chatter stability, CIRP Annals 55 (2006) 365-368",
+            "Merdol, Altintas, Multi frequency solution of chatter stability for low immersion milling, J. Manuf. Sci. Eng. 126 (2004) 459-466",
         ],
         examples: &[
             Example {
@@ -70,6 +74,11 @@ impl Calculator for MillingStability {
                 id: "wall",
                 title: "Tool and thin work yield: which of both limits, and what wall is left",
                 job: include_str!("examples/wall.json"),
+            },
+            Example {
+                id: "measured",
+                title: "Tool as a tap test measured it, work by a mode: how well the limit is known",
+                job: include_str!("examples/measured.json"),
             },
             Example {
                 id: "clamped",
@@ -117,13 +126,19 @@ impl Calculator for MillingStability {
 
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         checkpoint(monitor)?;
-        let case = Case::of(job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
-        let study = Study::new(job, case, monitor)?;
-        let (outcome, aside) = outcome(&study, cost(job).ms)?;
+        let estimate_ms = cost(job).ms;
+        // From here on the sides that were measured yield by their modes.
+        let (fits, job) = fits(job, monitor)?;
+        let case = Case::of(&job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
+        if let Some(finding) = too_expensive(&job, &case) {
+            return Err(Failure::OutOfModel(finding));
+        }
+        let study = Study::new(&job, case, fits, monitor)?;
+        let (outcome, aside) = outcome(&study, estimate_ms)?;
         let warnings = advice::warnings(&study, &outcome, &aside);
         let explanation = advice::explanation(&study, &outcome, &aside);
         monitor.progress(1.0, Message::new("stage_done"));
-        Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
+        Ok(Answer { output: outcome, warnings, explanation, basis: basis(&job, &study) })
     }
 
     fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
@@ -155,8 +170,12 @@ const REFINED: f64 = 1.8;
 /// Multipliers that the trials of pockets take.
 const TRIALS: f64 = 1500.0;
 
-/// A search for the limit of a slow cut, and its motion.
+/// The limit by measured lines.
+const DIRECT_MS: f64 = 150.0;
+
+/// A search for the limit of a slow cut with one mode, what a pair of modes adds, and its motion.
 const SLOW_MS: f64 = 60.0;
+const SLOW_PAIR_MS: f64 = 10.0;
 const SLOW_MOTION_MS: f64 = 60.0;
 
 /// Clamping: loads of a period at one place of the cut, on a dozen contacts; of a dozen times as many where the law bends.
@@ -179,6 +198,14 @@ fn elements(case: &Case, rotation: &model::Rotation) -> f64 {
 
 /// Of one multiplier.
 fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
+    if (model::Cut { rotation: *rotation, ..case.cut() }).is_slow() {
+        return slow_ms(case) / PER_SEARCH;
+    }
+    by_elements_ms(case, rotation)
+}
+
+/// The same by elements in time.
+fn by_elements_ms(case: &Case, rotation: &model::Rotation) -> f64 {
     let oscillations = case.oscillations_at(rotation).min(MOST_OSCILLATIONS);
     let directions = (0.5 * case.structure.basis.len() as f64).max(0.5).powf(1.5);
     let spaces = (1.0 + oscillations / SPACES_GROW) * (oscillations / RESTARTED).max(1.0).powf(1.3);
@@ -189,12 +216,37 @@ fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
     0.05 + ELEMENT_MS * directions * summed * elements(case, rotation) * spaces
 }
 
+/// Of a search for the limit of a slow cut.
+fn slow_ms(case: &Case) -> f64 {
+    let modes = case.structure.modes.len() as f64;
+    SLOW_MS + SLOW_PAIR_MS * modes * modes
+}
+
 /// Expected work.
 fn cost(job: &Job) -> Cost {
+    if !job.is_measured() {
+        return cost_of_modes(job);
+    }
+    let Some(with_modes) = guessed(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/tool" } };
+    let mut cost = cost_of_modes(&with_modes);
+    for (.., yielding) in job.sides() {
+        if let Yielding::Receptances(of) = yielding {
+            let fit = ReceptanceFit::cost(&of.fit_job());
+            (cost.ms, cost.bytes) = (cost.ms + fit.ms, cost.bytes + fit.bytes);
+        }
+    }
+    if job.asks(Asked::Intervals) {
+        cost.ms += DIRECT_MS;
+    }
+    cost
+}
+
+/// The same of a job whose modes are known.
+fn cost_of_modes(job: &Job) -> Cost {
     let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
     let is_slow = case.cut().is_slow();
     // In place of a multiplier and of a search for the limit stands one search.
-    let here = if is_slow { SLOW_MS / PER_SEARCH } else { point_ms(&case, &case.rotation) };
+    let here = point_ms(&case, &case.rotation);
     let directions = case.structure.basis.len() as f64;
     let mut parts = vec![(ANY_MS, "/cut/spindle_speed_rpm")];
     let mut bytes = 500_000.0 + 4e4 * elements(&case, &case.rotation) * directions;
@@ -204,11 +256,13 @@ fn cost(job: &Job) -> Cost {
     }
     if job.asks(Asked::Motion) {
         let repeats = case.milling.teeth_are_alike() && !case.rotation.varies();
-        let solved = if repeats { 0.5 } else { 2.0 } * here;
-        parts.push((if is_slow { SLOW_MOTION_MS } else { solved }, "/cut/spindle_speed_rpm"));
+        let solved = if repeats { 0.5 } else { 2.0 } * by_elements_ms(&case, &case.rotation);
+        let is_closed = is_slow && case.oscillations() > MOST_OSCILLATIONS;
+        parts.push((if is_closed { SLOW_MOTION_MS } else { solved }, "/cut/spindle_speed_rpm"));
     }
     let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
-    let clamping_ms = clamping.map_or(0.0, |of| (1.0 + of.stations.len() as f64) * CLAMPING_MS + 0.5 * here);
+    let places = |of: &PartClamping| of.places_mm(job.cut.feed_direction_deg).map_or(1, |places| places.len()) as f64;
+    let clamping_ms = clamping.map_or(0.0, |of| places(of) * CLAMPING_MS + 0.5 * here);
     if clamping.is_some() {
         parts.push((clamping_ms, "/clamping/stations"));
     }
@@ -234,6 +288,8 @@ fn cost(job: &Job) -> Cost {
         parts.push((REFINED * speeds * steps * PER_SEARCH * mean, "/lobes/speeds"));
         if job.asks(Asked::Speeds) {
             parts.push((TRIALS * mean, "/lobes/speeds"));
+            let others = job.cut.widths_mm.len() as f64;
+            parts.push((others * (TRIALS + REFINED * speeds * steps * PER_SEARCH) * mean, "/cut/widths_mm"));
             if clamping.is_some_and(|of| of.clamp_force().is_some()) {
                 parts.push((REFINED * speeds * CLAMP_DEPTHS * 0.2 * clamping_ms, "/clamping/stations"));
             }
@@ -250,7 +306,7 @@ fn cost(job: &Job) -> Cost {
 }
 
 /// The equations that acted.
-fn basis(job: &Job) -> Vec<Basis> {
+fn basis(job: &Job, study: &Study<'_>) -> Vec<Basis> {
     let mut used = vec![
         Basis { equation: "milling/2.2", source: "geometry of trochoidal teeth as circles" },
         Basis { equation: "milling/2.3", source: "mechanistic and Kienzle force" },
@@ -258,7 +314,17 @@ fn basis(job: &Job) -> Vec<Basis> {
         Basis { equation: "milling/3.10", source: "modal superposition of both sides" },
         Basis { equation: "milling/4.16", source: "Altintas, Budak 1995" },
     ];
-    let is_slow = Case::of(job).is_some_and(|case| case.cut().is_slow());
+    let is_slow = study.is_slow;
+    if !study.fits.is_empty() {
+        used.push(Basis {
+            equation: "receptance/3.1",
+            source: "least-squares complex frequency, Guillaume et al. 1998",
+        });
+        used.push(Basis { equation: "receptance/3.3", source: "least squares of real modes in the quantity measured" });
+    }
+    if !study.fits.is_empty() && job.asks(Asked::Intervals) && !is_slow {
+        used.push(Basis { equation: "milling/4.13", source: "multi-frequency solution, Merdol, Altintas 2004" });
+    }
     if is_slow {
         used.push(Basis { equation: "milling/4.21", source: "Altintas, Budak 1995, at every place of the arc" });
     }
@@ -284,6 +350,9 @@ fn basis(job: &Job) -> Vec<Basis> {
     }
     if job.asks(Asked::Speeds) {
         used.push(Basis { equation: "milling/7.25", source: "limits together, by removal rate" });
+        if !job.cut.widths_mm.is_empty() {
+            used.push(Basis { equation: "milling/7.26", source: "the same at every width" });
+        }
     }
     if job.asks(Asked::Proposals) {
         used.push(Basis { equation: "milling/7.27", source: "cutters tried" });
@@ -302,9 +371,9 @@ fn basis(job: &Job) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[job::CODES],
-    failures: &[],
-    warnings: &[advice::WARNING_CODES],
+    faults: &[job::CODES, FAULT_CODES[0], FAULT_CODES[1]],
+    failures: &[FAILURE_CODES],
+    warnings: &[advice::WARNING_CODES, FIT_WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&[
         "stage_multiplier",

@@ -10,7 +10,7 @@ pub(super) const EXPLANATION_CODES: &[&str] =
     &["mode_is", "modes_by_criterion", "function_met", "direction_counts_as_rigid"];
 
 /// Codes of the warnings made here.
-pub(super) const WARNING_CODES: &[&str] =
+pub(crate) const WARNING_CODES: &[&str] =
     &["modes_not_proportional", "remainder_has_pattern", "other_number_fits_better", "mode_implausible"];
 
 /// Phase of a residue beyond which a mode is not taken for a real one, degrees.
@@ -28,24 +28,25 @@ const PERCENT: f64 = 100.0;
 /// Names of the axes, as in the contract.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
+/// Pointers begin with `at`, where the job stands in another one.
+pub(crate) fn warnings(job: &Job, outcome: &Outcome, at: &str) -> Vec<Finding> {
     let mut found = Vec::new();
     for (index, (mode, known)) in outcome.modes.iter().zip(&outcome.certainty).enumerate() {
         let certain = CERTAIN * known.residue_phase_error_deg;
         if known.residue_phase_deg > REAL_MODE_DEG.max(certain) {
             found.push(
-                Finding::new("modes_not_proportional", "/files")
+                Finding::new("modes_not_proportional", format!("{at}/files"))
                     .measured(known.residue_phase_deg, REAL_MODE_DEG, "deg")
                     .with("mode", index + 1)
                     .with("frequency_hz", mode.frequency_hz),
             );
         }
-        found.extend(implausible(index, mode));
+        found.extend(implausible(index, mode, at));
     }
     for function in &outcome.functions {
         if function.neighbour_correlation > PATTERN {
             found.push(
-                Finding::new("remainder_has_pattern", format!("/files/{}", function.file))
+                Finding::new("remainder_has_pattern", format!("{at}/files/{}", function.file))
                     .measured(function.neighbour_correlation, PATTERN, "1")
                     .with("set", function.set)
                     .with("percent", PERCENT * function.residual_share),
@@ -55,7 +56,7 @@ pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     for group in &outcome.groups {
         if let Some(better) = group.better_modes {
             found.push(
-                Finding::new("other_number_fits_better", "/modes")
+                Finding::new("other_number_fits_better", format!("{at}/modes"))
                     .value(f64::from(job.modes.unwrap_or_default()), "1")
                     .with("better", better),
             );
@@ -65,7 +66,7 @@ pub(super) fn warnings(job: &Job, outcome: &Outcome) -> Vec<Finding> {
 }
 
 /// The first number of a mode that no machine has.
-fn implausible(index: usize, mode: &FittedMode) -> Option<Finding> {
+fn implausible(index: usize, mode: &FittedMode, at: &str) -> Option<Finding> {
     let numbers = [
         ("natural_frequency", mode.frequency_hz, USUAL_HZ, "Hz"),
         ("damping_ratio", mode.damping_ratio, USUAL_DAMPING, "1"),
@@ -74,7 +75,7 @@ fn implausible(index: usize, mode: &FittedMode) -> Option<Finding> {
     let (what, value, (low, high), unit) =
         numbers.into_iter().find(|(_, value, (low, high), _)| !(*low..=*high).contains(value))?;
     let limit = if value < low { low } else { high };
-    let finding = Finding::new("mode_implausible", "/files").measured(value, limit, unit);
+    let finding = Finding::new("mode_implausible", format!("{at}/files")).measured(value, limit, unit);
     Some(finding.with("what", what).with("mode", index + 1))
 }
 

@@ -11,6 +11,8 @@ mod output;
 mod picture;
 mod reader;
 
+pub(crate) use advice::{WARNING_CODES, warnings};
+pub(crate) use check::check_at;
 pub use input::{Direction, Job, MAX_FILES, MAX_MODES, ReceptanceFile, Residuals, Unit};
 pub use output::{CurveRow, FittedBand, FittedFunction, FittedGroup, FittedMode, ModeCertainty, Outcome};
 pub use reader::{Function, LEAST_LINES, MOST_LINES, read};
@@ -91,8 +93,8 @@ impl Calculator for ReceptanceFit {
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         checkpoint(monitor)?;
         monitor.progress(0.0, Message::new("stage_modes"));
-        let output = outcome(job, monitor)?;
-        let warnings = advice::warnings(job, &output);
+        let output = outcome(job, "", monitor)?;
+        let warnings = warnings(job, &output, "");
         let explanation = advice::explanation(&output);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: BASIS.to_vec() })
@@ -115,21 +117,24 @@ const BASIS: &[Basis] = &[
 ];
 
 /// Codes of a faultless job without answer.
-const FAILURE_CODES: &[&str] = &["no_mode_seen"];
+pub(crate) const FAILURE_CODES: &[&str] = &["no_mode_seen"];
+
+/// Codes of the faults of functions, for jobs that hold some.
+pub(crate) const FAULT_CODES: [&[&str]; 2] = [check::CODES, reader::CODES];
 
 /// Everything that this evaluation may utter.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, reader::CODES],
+    faults: &FAULT_CODES,
     failures: &[FAILURE_CODES],
-    warnings: &[advice::WARNING_CODES],
+    warnings: &[WARNING_CODES],
     explanations: &[advice::EXPLANATION_CODES],
     stages: &[&["stage_modes", "stage_done"]],
     labels: &[picture::LABEL_CODES],
 };
 
-fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
-    let functions =
-        read(&job.files, "/files").map_err(|_| Failure::Internal("a checked file is not read".to_owned()))?;
+/// The modes of the functions of a job without faults; pointers begin with `at`, where it stands in another one.
+pub(crate) fn outcome(job: &Job, at: &str, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
+    let functions = read(&job.files, at).map_err(|_| Failure::Internal("a checked file is not read".to_owned()))?;
     let mut found = Outcome {
         modes: Vec::new(),
         certainty: Vec::new(),
@@ -141,21 +146,21 @@ fn outcome(job: &Job, monitor: &dyn Monitor) -> Result<Outcome, Failure> {
     let stop = || monitor.cancelled();
     for mut group in model::groups(&functions, job.band_hz(), job.residuals) {
         let modes = job.modes.and_then(|modes| usize::try_from(modes).ok());
-        let chosen = model::choose(&mut group, modes, &stop).map_err(|unfit| refused(unfit, &functions, &group))?;
+        let chosen = model::choose(&mut group, modes, &stop).map_err(|unfit| refused(unfit, &functions, &group, at))?;
         add(&mut found, &group, &chosen);
     }
     found.curve.sort_by_key(|row| row.function);
     Ok(found)
 }
 
-fn refused(unfit: Unfit, functions: &[Function], group: &Group) -> Failure {
+fn refused(unfit: Unfit, functions: &[Function], group: &Group, at: &str) -> Failure {
     match unfit {
         Unfit::Stopped => Failure::Cancelled,
         Unfit::NoMode | Unfit::TooFew => {
             let function = &functions[group.lines[0].function];
             let lines: usize = group.lines.iter().map(|lines| lines.values.len()).sum();
             Failure::OutOfModel(
-                Finding::new("no_mode_seen", format!("/files/{}", function.file))
+                Finding::new("no_mode_seen", format!("{at}/files/{}", function.file))
                     .with("response", function.response.name())
                     .with("excitation", function.excitation.name())
                     .with("lines", lines),

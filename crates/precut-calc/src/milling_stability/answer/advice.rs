@@ -2,23 +2,28 @@
 
 use crate::calculator::{Finding, Message};
 use crate::fixture_stability::{
-    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, Friction, STATED_FREQUENCY, STATED_RATIO,
+    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, Friction, FrictionRange, STATED_FREQUENCY, STATED_RATIO,
 };
+use crate::receptance_fit::warnings as fit_warnings;
 
-use super::super::job::{Asked, EdgeForce, Job, modes, way};
-use super::super::model::Law;
+use super::super::job::{Asked, EdgeForce, Job, YieldingMode, modes, way};
+use super::super::model::{GROWN, Law};
 use super::clamping::is_enough;
+use super::growth::Growth;
 use super::output::{
-    ClampCriterion, ClampRemedyKind, CutterProposal, ForceOfSide, InstabilityKind, LeadingMultiplier, MillingClamping,
-    MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket, UnstableInterval,
+    ClampCriterion, ClampRemedyKind, ClampStation, CrossingMethod, CutterProposal, ForceOfSide, InstabilityKind,
+    LeadingMultiplier, MillingClamping, MillingState, Outcome, ProposalKind, RigidLimits, SpeedPocket,
+    UnstableInterval,
 };
 use super::proposals::effort;
-use super::{Aside, MODEL_ENDS, Study};
+use super::{Aside, MODEL_ENDS, Study, UM_PER_MM, measured};
 
 /// Above this share of the limit a cut is near to it.
 const NEAR_LIMIT: f64 = 0.9;
 /// A floor of the chip matters where half or twice of it moves the limit by more than this share.
 const FLOOR_MATTERS: f64 = 0.05;
+/// Which surface a tooth meets depends on a motion that is larger than this share of the run-out.
+const PAIRING_MATTERS: f64 = 0.5;
 /// The zeroth order misleads where it lies above the true limit by more than this share.
 const ABOVE: f64 = 0.02;
 /// One side limits where a rigid other one changes the limit by less than this share.
@@ -32,6 +37,8 @@ const NO_FORCE_N: f64 = 1e-6;
 
 pub(in crate::milling_stability) const WARNING_CODES: &[&str] = &[
     "no_damping",
+    "fit_changes_limit",
+    "pairing_of_undisturbed_chips",
     "near_chatter_limit",
     "depth_not_examined",
     "multiplier_not_converged",
@@ -56,6 +63,8 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "milling_stable",
     "milling_settles_slowly",
     "milling_slow_cut",
+    "milling_grows_within",
+    "milling_grows_in_modulation",
     "milling_chatters",
     "milling_undecided",
     "milling_overloaded",
@@ -65,6 +74,7 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "milling_comes_off",
     "clamping_holds_from",
     "clamping_certain_slip",
+    "clamping_along_the_feed",
     "clamping_at_hand",
     "clamping_cannot_hold",
     "clamping_dynamic",
@@ -72,6 +82,10 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
     "no_chatter_limit",
     "milling_island",
     "milling_unstable_throughout",
+    "side_is_measured",
+    "measured_side_is_rigid",
+    "limit_by_receptance",
+    "receptance_not_solved",
     "side_limits",
     "both_sides_limit",
     "direction_limits",
@@ -94,11 +108,13 @@ pub(in crate::milling_stability) const EXPLANATION_CODES: &[&str] = &[
 pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Finding> {
     let (job, case) = (study.job, &study.case);
     let mut found = Vec::new();
-    for ((at, _), mode) in modes(job).zip(&case.structure.modes) {
-        if mode.damping_ratio < UNDAMPED {
-            found.push(Finding::new("no_damping", format!("{at}/damping_ratio")));
-        }
+    for (at, _) in stated(study).filter(|(_, mode)| mode.ratio().is_some_and(|ratio| ratio < UNDAMPED)) {
+        found.push(Finding::new("no_damping", format!("{at}/damping_ratio")));
     }
+    for fit in &study.fits {
+        found.extend(fit_warnings(&fit.job, &fit.fitted, fit.at));
+    }
+    found.extend(measured::doubts(study, outcome));
     let depth = case.depth_mm;
     if let Some(limit) = outcome.first_limit_mm
         && depth >= NEAR_LIMIT * limit
@@ -111,7 +127,7 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
         found.push(Finding::new("depth_not_examined", "/limits/depth_max_mm").measured(depth, to, "mm"));
     }
     if let Some(multiplier) = &outcome.multiplier
-        && (multiplier.modulus - 1.0).abs() <= multiplier.modulus_error
+        && Growth::of(multiplier, study.is_slow) == Growth::Unknown
     {
         found.push(Finding::new("multiplier_not_converged", "/cut").measured(
             multiplier.modulus,
@@ -119,7 +135,8 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
             "1",
         ));
     }
-    if let Some(doubtful) = outcome.unstable_intervals.iter().find(|interval| !interval.certified) {
+    let is_doubtful = |of: &&UnstableInterval| of.found_by == CrossingMethod::Multiplier && !of.certified;
+    if let Some(doubtful) = outcome.unstable_intervals.iter().find(is_doubtful) {
         let at = doubtful.from_mm.or(doubtful.to_mm).unwrap_or(0.0);
         found.push(Finding::new("crossing_not_certified", "/limits/depths").value(at, "mm"));
     }
@@ -159,16 +176,29 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
         found.push(Finding::new("strip_offset_idle", "/cut/offset_mm").value(job.cut.offset_mm, "mm"));
     }
     of_spindle(study, outcome, &mut found);
-    found.extend(implausible(job));
+    found.extend(implausible(study));
     found.extend(of_clamping(job, outcome));
     if let Some(swing) = aside.beyond_mm {
         let limit = MODEL_ENDS * case.milling.radius_mm;
         found.push(Finding::new("motion_beyond_model", "/cut/depth_mm").measured(swing, limit, "mm"));
     }
+    let run_out_mm = case.milling.run_out_mm();
+    if let Some(swing) = aside.beside_run_out_mm.filter(|swing| *swing > PAIRING_MATTERS * run_out_mm) {
+        found.push(Finding::new("pairing_of_undisturbed_chips", "/cutter").measured(
+            UM_PER_MM * swing,
+            UM_PER_MM * run_out_mm,
+            "um",
+        ));
+    }
     if aside.no_motion {
         found.push(Finding::new("no_forced_motion", "/cut/spindle_speed_rpm"));
     }
     found
+}
+
+/// Modes that the job itself states, with where they stand.
+fn stated<'a>(study: &'a Study<'_>) -> impl Iterator<Item = (String, &'a YieldingMode)> {
+    modes(study.job).filter(|(at, _)| !study.fits.iter().any(|fit| at.starts_with(fit.at)))
 }
 
 /// Where another floor of the chip moves the limit.
@@ -210,7 +240,7 @@ fn of_spindle(study: &Study<'_>, outcome: &Outcome, found: &mut Vec<Finding>) {
 
 fn of_clamping(job: &Job, outcome: &Outcome) -> Vec<Finding> {
     let (Some(clamping), Some(told)) = (&job.clamping, &outcome.clamping) else { return Vec::new() };
-    let Friction { low, high, .. } = Friction::ASSUMED;
+    let FrictionRange { low, high, .. } = Friction::ASSUMED.range();
     let assumed = clamping.frictions().into_iter().filter(|(_, friction)| *friction == Friction::ASSUMED);
     let mut found: Vec<Finding> = assumed
         .take(1)
@@ -235,9 +265,9 @@ fn rounded_up(force_n: f64) -> f64 {
 }
 
 /// Numbers that were likely given in another unit. None is changed.
-fn implausible(job: &Job) -> Vec<Finding> {
-    let mut found = Vec::new();
-    for (at, mode) in modes(job) {
+fn implausible(study: &Study<'_>) -> Vec<Finding> {
+    let (job, mut found) = (study.job, Vec::new());
+    for (at, mode) in stated(study) {
         match (mode.frequency_hz, mode.natural_hz()) {
             (Some(stated), _) => found.extend(STATED_FREQUENCY.on(stated, format!("{at}/frequency_hz"))),
             (None, Some(implied)) => found.extend(FREQUENCY.on(implied, format!("{at}/stiffness_n_per_mm"))),
@@ -275,6 +305,7 @@ pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Out
         });
         said.extend(outcome.unstable_intervals.iter().filter_map(island));
     }
+    said.extend(measured::said(study, outcome));
     said.extend(outcome.limited_by.iter().flat_map(|limited| of_sides(limited, outcome)));
     said.extend(of_drive(outcome));
     let work = &outcome.force.work;
@@ -324,13 +355,19 @@ fn of_multiplier(state: MillingState, multiplier: &LeadingMultiplier) -> Message
                 None => message,
             }
         }
+        MillingState::GrowsWithin => Message::new("milling_grows_within")
+            .with("per_tooth", multiplier.per_tooth)
+            .with("growth", multiplier.transient_growth.unwrap_or(0.0))
+            .with("frequency_hz", multiplier.chatter_frequency_hz.unwrap_or(0.0)),
         _ => Message::new("milling_undecided").with("modulus", multiplier.modulus),
     }
 }
 
 /// The same of a slow cut.
-fn of_slow(outcome: &Outcome, aside: &Aside) -> Message {
-    let message = Message::new("milling_slow_cut").with("oscillations", outcome.cost.oscillations_per_period);
+fn of_slow(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Message {
+    let message = Message::new("milling_slow_cut")
+        .with("oscillations", outcome.cost.oscillations_per_period)
+        .with("of", if study.cut().repeats() { "tooth" } else { "arc" });
     match outcome.first_limit_mm.zip(aside.slow_hz) {
         Some((depth_mm, hz)) => message.with("depth_mm", depth_mm).with("frequency_hz", hz),
         None => message.with("examined_mm", outcome.examined_to_mm),
@@ -339,10 +376,12 @@ fn of_slow(outcome: &Outcome, aside: &Aside) -> Message {
 
 fn of_verdict(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Message> {
     let Some(verdict) = &outcome.verdict else { return Vec::new() };
-    let of_growth =
-        outcome.multiplier.as_ref().map_or_else(|| of_slow(outcome, aside), |of| of_multiplier(verdict.state, of));
+    let of_growth = outcome
+        .multiplier
+        .as_ref()
+        .map_or_else(|| of_slow(study, outcome, aside), |of| of_multiplier(verdict.state, of));
     let mut said = vec![match verdict.state {
-        MillingState::Stable | MillingState::Chatter | MillingState::Undecided => of_growth,
+        MillingState::Stable | MillingState::Chatter | MillingState::GrowsWithin | MillingState::Undecided => of_growth,
         MillingState::Overloaded => {
             Message::new("milling_overloaded").with("margin", verdict.drive_margin.unwrap_or(0.0))
         }
@@ -354,8 +393,13 @@ fn of_verdict(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Messag
             .with("off_n", outcome.clamping.as_ref().and_then(|clamping| clamping.comes_off_n).unwrap_or(0.0)),
     }];
     let is_told = matches!(verdict.state, MillingState::Stable | MillingState::Chatter);
-    if study.is_slow && !is_told {
-        said.push(of_slow(outcome, aside));
+    if study.is_slow && (!is_told || outcome.multiplier.is_some()) {
+        said.push(of_slow(study, outcome, aside));
+    }
+    if let Some(multiplier) = outcome.multiplier.as_ref().filter(|of| study.case.rotation.varies() && of.modulus < 1.0)
+        && let Some(growth) = multiplier.transient_growth.filter(|growth| *growth >= GROWN)
+    {
+        said.push(Message::new("milling_grows_in_modulation").with("growth", growth));
     }
     if let Some(multiplier) = &outcome.multiplier
         && let Some(time_s) = multiplier.settling_time_s.filter(|time| *time > SLOW_S)
@@ -418,6 +462,7 @@ fn holding(study: &Study<'_>, clamping: &MillingClamping, force: &ForceOfSide, a
             None => message,
         });
     }
+    said.extend(along_the_feed(clamping));
     let at_hand = study.held.as_ref().and_then(|held| held.clamp_force_n);
     if let Some((force, safety)) = at_hand.zip(clamping.clamp_safety) {
         let message = Message::new("clamping_at_hand").with("force_n", force).with("safety", safety);
@@ -427,6 +472,28 @@ fn holding(study: &Study<'_>, clamping: &MillingClamping, force: &ForceOfSide, a
         said.push(Message::new("clamping_dynamic").with("factor", factor));
     }
     said
+}
+
+/// Over which way the cut was taken to go where the job does not say it, and where on it most is asked.
+fn along_the_feed(clamping: &MillingClamping) -> Option<Message> {
+    if !clamping.stations_assumed {
+        return None;
+    }
+    let message = Message::new("clamping_along_the_feed");
+    let apart = |a: &ClampStation, b: &ClampStation| (a.x_mm - b.x_mm).hypot(a.y_mm - b.y_mm);
+    let all = &clamping.stations;
+    let pairs = all.iter().enumerate().flat_map(|(i, from)| all[i + 1..].iter().map(move |to| (from, to)));
+    let Some((from, to)) = pairs.max_by(|(a, b), (c, d)| apart(a, b).total_cmp(&apart(c, d))) else {
+        return Some(message);
+    };
+    let message =
+        message.with("x1_mm", from.x_mm).with("y1_mm", from.y_mm).with("x2_mm", to.x_mm).with("y2_mm", to.y_mm);
+    let force = |of: &ClampStation| of.clamp_force_min_n.unwrap_or(f64::INFINITY);
+    let most = all.iter().max_by(|a, b| force(a).total_cmp(&force(b)))?;
+    Some(match most.clamp_force_min_n {
+        Some(asked) => message.with("x_mm", most.x_mm).with("y_mm", most.y_mm).with("asked_n", rounded_up(asked)),
+        None => message,
+    })
 }
 
 /// A stretch with an end is an island: below and above it the cut is stable.
@@ -483,6 +550,8 @@ fn of_speeds(study: &Study<'_>, outcome: &Outcome) -> Vec<Message> {
         Message::new("pocket_is")
             .with("spindle_speed_rpm", pocket.spindle_speed_rpm)
             .with("depth_mm", pocket.depth_mm)
+            .with("width_mm", pocket.width_mm)
+            .with("of_widths", if study.job.cut.widths_mm.is_empty() { "no" } else { "yes" })
             .with("removal_rate_cm3_per_min", pocket.removal_rate_cm3_per_min)
             .with("now_cm3_per_min", now)
             .with("binds", pocket.binds.name())

@@ -6,8 +6,8 @@ use crate::clamping::{Asked as AskedOfSheet, Contact, Criterion, Load, Rest, She
 use super::super::job::{Held, way};
 use super::super::model::{Carried, Cut, Forced, Instant, MOST_OSCILLATIONS, Sampling, Side, statics};
 use super::output::{
-    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampTurn, ClampingStatus, ContactUse,
-    MillingClamping,
+    ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
+    ContactUse, MillingClamping,
 };
 use super::{MODEL_ENDS, Study};
 
@@ -151,6 +151,8 @@ pub(super) fn clamping(study: &Study<'_>, held: &Held) -> Result<(MillingClampin
                 against_mean_n: None,
                 certain_slip_below_n: None,
                 certain_slip_by_mean_n: None,
+                stations: stations(held, &loads),
+                stations_assumed: held.is_way_assumed,
                 decides: None,
                 clamp_safety: None,
                 certain_slip_safety: None,
@@ -166,6 +168,17 @@ pub(super) fn clamping(study: &Study<'_>, held: &Held) -> Result<(MillingClampin
             (nothing, free)
         }
     })
+}
+
+/// What each place of the cut asks for; loads go instant by instant over all places.
+fn stations(held: &Held, loads: &[Load]) -> Vec<ClampStation> {
+    let count = held.points_mm.len();
+    let of = |(place, &[x_mm, y_mm, z_mm]): (usize, &Vector)| {
+        let there: Vec<Load> = loads.iter().skip(place).step_by(count).copied().collect();
+        let clamp_force_min_n = asked_n(held, &there).ok().map(|force_n| force_n.max(0.0));
+        ClampStation { x_mm, y_mm, z_mm, clamp_force_min_n }
+    };
+    held.points_mm.iter().enumerate().map(of).collect()
 }
 
 fn number(index: usize) -> u32 {
@@ -210,6 +223,8 @@ fn told(
         against_mean_n: Some(sheet.against_mean_n),
         certain_slip_below_n: sheet.certain_slip_below_n,
         certain_slip_by_mean_n: sheet.certain_slip_by_mean_n,
+        stations: self::stations(held, loads),
+        stations_assumed: held.is_way_assumed,
         decides,
         clamp_safety: sheet.at_hand.map(|at_hand| at_hand.no_slip_factor),
         certain_slip_safety: sheet.at_hand.and_then(|at_hand| at_hand.certain_slip_factor),

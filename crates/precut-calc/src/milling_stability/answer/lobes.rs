@@ -8,7 +8,7 @@ use super::super::job::range_rpm;
 use super::super::model::MOST_OSCILLATIONS;
 use super::super::model::{Cut, Rotation, Scan, Search, scan};
 use super::output::{LobeIntervals, MillingBoundary, MillingLobes, MillingMap, SpeedStatus};
-use super::{Study, intervals, scan_of};
+use super::{Study, intervals};
 
 /// Speeds or columns between two looks whether anybody still waits; every multiplier looks for itself besides.
 const PER_LOOK: usize = 16;
@@ -37,7 +37,9 @@ impl Row {
 /// The spindle at a speed, unless it is not answered.
 pub(super) fn rotation_at(study: &Study<'_>, spindle_rpm: f64) -> Result<Rotation, SpeedStatus> {
     let rotation = study.case.at_speed(spindle_rpm).ok_or(SpeedStatus::Incommensurate)?;
-    if study.case.oscillations_at(&rotation) > MOST_OSCILLATIONS { Err(SpeedStatus::TooSlow) } else { Ok(rotation) }
+    let cut = Cut { rotation, ..study.cut() };
+    let is_told = cut.oscillations() <= MOST_OSCILLATIONS || (cut.is_slow() && cut.repeats());
+    if is_told { Ok(rotation) } else { Err(SpeedStatus::TooSlow) }
 }
 
 /// One speed, to the accuracy of maps.
@@ -47,6 +49,10 @@ pub(super) fn row(study: &Study<'_>, spindle_rpm: f64) -> Result<Row, Failure> {
         Err(status) => return Ok(Row { spindle_rpm, status, scan: Scan::default() }),
     };
     let cut = Cut { rotation, ..study.cut() };
+    if cut.is_slow() {
+        let scan = study.slow_limit(&cut)?.map_or_else(Scan::default, |limit| Scan::from_limit(limit.depth_mm));
+        return Ok(Row { spindle_rpm, status: SpeedStatus::Answered, scan });
+    }
     let search =
         Search { depth_max_mm: study.examined_mm, steps: study.job.limits.depths, only_first: false, on_map: true };
     let scan = scan(&study.orders, &cut, &search, study.monitor)?;
@@ -96,7 +102,7 @@ fn differ(a: &Row, b: &Row) -> bool {
 
 /// Where a crossing was first met by the accurate search, for a speed that is told.
 pub(super) fn first_mm(study: &Study<'_>, rotation: Rotation) -> Result<Option<f64>, Failure> {
-    Ok(scan_of(study, &Cut { rotation, ..study.cut() }, true)?.first_mm())
+    study.first_limit_mm(&Cut { rotation, ..study.cut() })
 }
 
 pub(super) fn lobes(study: &Study<'_>, rows: &[Row]) -> Result<MillingLobes, Failure> {

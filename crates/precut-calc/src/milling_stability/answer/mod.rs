@@ -2,7 +2,9 @@
 
 pub(super) mod advice;
 mod clamping;
+mod growth;
 mod lobes;
+mod measured;
 pub(super) mod output;
 pub(super) mod picture;
 mod proposals;
@@ -14,22 +16,21 @@ use std::f64::consts::{PI, TAU};
 use crate::calculator::{Failure, Message, Monitor};
 use crate::fixture_stability::power_kw;
 
-use super::job::{Asked, Case, Held, Job, RubbingSource};
+use super::job::{Asked, Case, Fit, Held, Job, RubbingSource};
 use super::model::{
-    self, Cut, Law, Milling, Multiplier, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan, slow_limit,
-    statics, unstable, zeroth,
+    self, Cut, Law, MOST_OSCILLATIONS, Milling, Orders, Rotation, Scan, Search, Structure, Wall, Zeroth, scan,
+    slow_limit, statics, unstable, zeroth,
 };
+use growth::{Growth, multiplier};
 use output::{
-    ClampingStatus, DepthLine, ForceOfSide, FrequencyShare, LeadingMultiplier, MillingClamping, MillingCost,
-    MillingEngagement, MillingForces, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions,
-    Outcome, UnstableInterval, WallSide, WallSurface, YieldingSide,
+    ClampingStatus, CrossingMethod, DepthLine, ForceOfSide, MillingClamping, MillingCost, MillingEngagement,
+    MillingForces, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions, Outcome, UnstableInterval,
+    WallSide, WallSurface, YieldingSide,
 };
 
 const UM_PER_MM: f64 = 1e3;
 const N_MM_PER_N_M: f64 = 1e3;
 const MM3_PER_CM3: f64 = 1e3;
-/// A disturbance of this share has died away.
-const DECAYED: f64 = 1e-3;
 /// Depths are looked at up to so many times the least limit of the zeroth order, and so many times the working depth.
 const ZEROTH_TIMES: f64 = 6.0;
 const WORKING_TIMES: f64 = 1.5;
@@ -48,6 +49,8 @@ pub(super) const MODEL_ENDS: f64 = 0.2;
 pub(super) struct Study<'a> {
     pub job: &'a Job,
     pub case: Case,
+    /// Sides that were measured.
+    pub fits: Vec<Fit>,
     pub orders: Orders,
     pub zeroth: Option<Zeroth>,
     /// Hundreds of oscillations from tooth to tooth: closed forms in place of multipliers.
@@ -69,21 +72,25 @@ pub(super) struct Aside {
     pub slow_hz: Option<f64>,
     /// No periodic motion was found.
     pub no_motion: bool,
+    /// Swing of the forced motion of a cutter with run-out, mm.
+    pub beside_run_out_mm: Option<f64>,
     /// Along or about which axis nothing holds the workpiece against the cut.
     pub free: Option<&'static str>,
 }
 
 impl<'a> Study<'a> {
-    pub(super) fn new(job: &'a Job, case: Case, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
+    /// Of a job whose measured sides have become modes, and what was measured.
+    pub(super) fn new(job: &'a Job, case: Case, fits: Vec<Fit>, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
         let zeroth = if case.structure.modes.is_empty() { None } else { zeroth(&case.milling, &case.structure) };
         let examined_mm = examined_mm(job, &case, zeroth);
         let torque_at_1_mm_n_m = statics(&case.milling, 1.0, monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
         let clamping = job.clamping.as_ref().filter(|_| job.asks(Asked::Clamping));
-        let held = clamping.and_then(|clamping| clamping.held()?.ok());
+        let held = clamping.and_then(|clamping| clamping.held(job.cut.feed_direction_deg)?.ok());
         let is_slow = case.cut().is_slow();
         Ok(Self {
             job,
             case,
+            fits,
             orders: Orders::default(),
             zeroth,
             is_slow,
@@ -104,16 +111,16 @@ impl<'a> Study<'a> {
     }
 
     /// Depth at which a cut first becomes unstable.
-    fn first_limit_mm(&self, cut: &Cut<'_>) -> Result<Option<f64>, Failure> {
-        if self.is_slow {
+    pub(super) fn first_limit_mm(&self, cut: &Cut<'_>) -> Result<Option<f64>, Failure> {
+        if cut.is_slow() || (self.is_slow && cut.is_as_slow()) {
             return Ok(self.slow_limit(cut)?.map(|limit| limit.depth_mm));
         }
         Ok(scan_of(self, cut, true)?.first_mm())
     }
 
     /// That of a slow cut, with its frequency.
-    fn slow_limit(&self, cut: &Cut<'_>) -> Result<Option<Zeroth>, Failure> {
-        slow_limit(cut.milling, cut.structure, self.examined_mm, self.monitor)
+    pub(super) fn slow_limit(&self, cut: &Cut<'_>) -> Result<Option<Zeroth>, Failure> {
+        slow_limit(cut, self.examined_mm, self.monitor)
     }
 
     /// The exponent by which 1 over the modulus of a period becomes that of a tooth.
@@ -151,7 +158,7 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let mut aside = Aside::default();
     monitor.progress(0.02, Message::new("stage_multiplier"));
     let force = forces(study)?;
-    let multiplier = if job.asks(Asked::Verdict) && !study.is_slow { Some(multiplier(study)?) } else { None };
+    let multiplier = if job.asks(Asked::Verdict) { multiplier(study)? } else { None };
     monitor.progress(0.1, Message::new("stage_intervals"));
     let intervals_asked = job.asks(Asked::Intervals);
     let seen = if intervals_asked && !study.is_slow { Some(scan_of(study, &study.cut(), false)?) } else { None };
@@ -162,6 +169,9 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let other_assumptions = if intervals_asked { other_assumptions(study)? } else { OtherAssumptions::default() };
     monitor.progress(0.4, Message::new("stage_motion"));
     let motion = if job.asks(Asked::Motion) { motion(study, &mut aside)? } else { None };
+    if case.milling.has_run_out() && job.asks_stability() && !study.is_slow {
+        aside.beside_run_out_mm = swing_mm(study)?;
+    }
     monitor.progress(0.45, Message::new("stage_clamping"));
     let clamping = study.held.as_ref().map(|held| clamping::clamping(study, held)).transpose()?;
     let clamping = clamping.map(|(clamping, free)| {
@@ -171,13 +181,14 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let rows = if job.asks(Asked::Lobes) || job.asks(Asked::Speeds) { lobes::rows(study)? } else { Vec::new() };
     let lobes = if job.asks(Asked::Lobes) { Some(lobes::lobes(study, &rows)?) } else { None };
     let first_limit_mm = seen.as_ref().and_then(Scan::first_mm).or(slow.map(|limit| limit.depth_mm));
-    let grows = match &multiplier {
-        Some((found, _)) if (found.modulus - 1.0).abs() <= found.modulus_error => None,
-        Some((found, _)) => Some(found.modulus > 1.0),
-        None => Some(first_limit_mm.is_some_and(|limit| case.depth_mm >= limit)),
+    let by_receptance = if intervals_asked { measured::limit(study, first_limit_mm)? } else { None };
+    let growth = match &multiplier {
+        Some((found, _)) => Growth::of(found, study.is_slow),
+        None if first_limit_mm.is_some_and(|limit| case.depth_mm >= limit) => Growth::Grows,
+        None => Growth::DiesOut,
     };
     let verdict = job.asks(Asked::Verdict).then(|| MillingVerdict {
-        state: state(study, grows, &force, motion.as_ref(), clamping.as_ref()),
+        state: state(study, growth, &force, motion.as_ref(), clamping.as_ref()),
         depth_margin: first_limit_mm.filter(|_| case.depth_mm > 0.0).map(|limit| limit / case.depth_mm),
         drive_margin: drive_margin(&force),
     });
@@ -190,13 +201,16 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
         modes: modes(case, energy.as_deref()),
         first_limit_mm,
         unstable_intervals: match slow.filter(|_| intervals_asked) {
-            Some(limit) => vec![UnstableInterval::from(limit.depth_mm)],
+            Some(limit) => vec![UnstableInterval::of_slow(limit.depth_mm)],
             None => seen.as_ref().map(intervals).unwrap_or_default(),
         },
         examined_to_mm: study.examined_mm,
         islands_checked_to_mm: seen.as_ref().map(|_| study.examined_mm),
         depth_line: seen.as_ref().map(|seen| depth_line(study, seen)),
         limited_by,
+        measured: measured::sides(study),
+        limit_by_receptance_mm: by_receptance.and_then(|of| of.0),
+        receptance_limit: by_receptance.map(|of| of.1),
         other_assumptions,
         zeroth_order_min_mm: study.zeroth.map(|zeroth| zeroth.depth_mm),
         zeroth_order_frequency_hz: study.zeroth.map(|zeroth| zeroth.frequency_hz),
@@ -209,8 +223,9 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
         cost: MillingCost { oscillations_per_period: case.oscillations(), estimate_ms },
     };
     if job.asks(Asked::Speeds) {
-        let (best, curve) = speeds::speeds(study, &rows, &outcome)?;
-        (outcome.speeds, outcome.speed_curve) = (best, Some(curve));
+        let (mut best, curve) = speeds::speeds(study, &rows, &outcome)?;
+        best.extend(speeds::of_other_widths(study, &outcome)?);
+        (outcome.speeds, outcome.speed_curve) = (speeds::ranked(best), Some(curve));
     }
     if job.asks(Asked::Proposals) {
         let hz = outcome.multiplier.as_ref().and_then(|multiplier| multiplier.chatter_frequency_hz);
@@ -258,15 +273,16 @@ fn other_assumptions(study: &Study<'_>) -> Result<OtherAssumptions, Failure> {
 
 fn state(
     study: &Study<'_>,
-    grows: Option<bool>,
+    growth: Growth,
     force: &MillingForces,
     motion: Option<&MillingMotion>,
     clamping: Option<&MillingClamping>,
 ) -> MillingState {
-    match grows {
-        None => return MillingState::Undecided,
-        Some(true) => return MillingState::Chatter,
-        Some(false) => {}
+    match growth {
+        Growth::Unknown => return MillingState::Undecided,
+        Growth::Grows => return MillingState::Chatter,
+        Growth::GrowsWithin => return MillingState::GrowsWithin,
+        Growth::DiesOut => {}
     }
     if let Some(state) = clamping.and_then(loose) {
         return state;
@@ -344,40 +360,6 @@ fn forces(study: &Study<'_>) -> Result<MillingForces, Failure> {
     })
 }
 
-/// The leading multiplier, and the share of each mode in its energy.
-fn multiplier(study: &Study<'_>) -> Result<(LeadingMultiplier, Option<Vec<f64>>), Failure> {
-    let cut = study.cut();
-    let unsolved = Failure::NotConverged { what: "largest Floquet multiplier", residual: 1.0, iterations: 0 };
-    let (found, modulus_error) = study.orders.with_error(&cut, study.monitor)?.ok_or(unsolved)?;
-    let shares = study.orders.shares(&cut, study.monitor)?;
-    let period_s = cut.rotation.period_s(cut.milling.period_rad());
-    let growth_per_s = found.growth() / period_s;
-    let aliases: Vec<FrequencyShare> = shares
-        .iter()
-        .flat_map(|shares| &shares.aliases)
-        .map(|alias| FrequencyShare { frequency_hz: alias.frequency_hz, share: alias.share })
-        .collect();
-    let told = LeadingMultiplier {
-        modulus: found.modulus(),
-        real: found.re,
-        imaginary: found.im.abs(),
-        kind: found.kind().into(),
-        period_s,
-        per_tooth: per_tooth(&found, study.teeth_per_period(&cut.rotation)),
-        growth_per_s,
-        settling_time_s: (growth_per_s < 0.0).then(|| DECAYED.ln() / growth_per_s),
-        modulus_error,
-        chatter_frequency_hz: aliases.first().map(|alias| alias.frequency_hz),
-        aliases,
-    };
-    Ok((told, shares.map(|shares| shares.energy)))
-}
-
-/// |mu| from tooth to tooth.
-fn per_tooth(found: &Multiplier, teeth: f64) -> f64 {
-    (found.growth() / teeth).exp()
-}
-
 fn modes(case: &Case, energy: Option<&[f64]>) -> Vec<ModeShare> {
     let of = |(index, mode): (usize, &model::Mode)| ModeShare {
         side: if mode.side == model::Side::Tool { YieldingSide::Tool } else { YieldingSide::Work },
@@ -409,15 +391,16 @@ fn intervals(seen: &Scan) -> Vec<UnstableInterval> {
             from_high_mm: stretch.from.map(|at| at.bracket_mm[1]),
             to_low_mm: stretch.to.map(|at| at.bracket_mm[0]),
             to_high_mm: stretch.to.map(|at| at.bracket_mm[1]),
+            found_by: CrossingMethod::Multiplier,
             certified: [stretch.from, stretch.to].into_iter().flatten().all(|at| at.certified),
         }
     };
     stretches.iter().map(of).collect()
 }
 
-impl From<f64> for UnstableInterval {
-    /// Of a slow cut: from its limit on.
-    fn from(limit_mm: f64) -> Self {
+impl UnstableInterval {
+    /// Of a slow cut: from its limit on. A closed form has no bracket.
+    fn of_slow(limit_mm: f64) -> Self {
         Self {
             from_mm: Some(limit_mm),
             to_mm: None,
@@ -426,7 +409,8 @@ impl From<f64> for UnstableInterval {
             from_high_mm: None,
             to_low_mm: None,
             to_high_mm: None,
-            certified: true,
+            found_by: CrossingMethod::ClosedForm,
+            certified: false,
         }
     }
 }
@@ -445,7 +429,7 @@ fn motion(study: &Study<'_>, aside: &mut Aside) -> Result<Option<MillingMotion>,
         return Ok(None);
     };
     let (low, high) = forced.extremes();
-    let swing = (0..3).map(|q| high[q] - low[q]).fold(0.0, f64::max);
+    let swing = forced.swing_mm();
     if swing > MODEL_ENDS * cut.milling.radius_mm || !swing.is_finite() {
         aside.beyond_mm = Some(swing);
         return Ok(None);
@@ -462,6 +446,16 @@ fn motion(study: &Study<'_>, aside: &mut Aside) -> Result<Option<MillingMotion>,
         peak_to_peak_um: um(swing),
         walls,
     }))
+}
+
+/// The largest peak-to-peak motion of a direction; `None` where there is no periodic one.
+fn swing_mm(study: &Study<'_>) -> Result<Option<f64>, Failure> {
+    let cut = study.cut();
+    if cut.oscillations() > MOST_OSCILLATIONS {
+        return Ok(None);
+    }
+    let forced = study.orders.forced(&cut, study.monitor)?;
+    Ok(forced.map(|forced| forced.swing_mm()).filter(|swing| swing.is_finite()))
 }
 
 fn surface(forced: &model::Forced<'_>, wall: Wall, depth_mm: f64) -> WallSurface {

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::receptance_fit::{Direction, FittedFunction, FittedGroup, ModeCertainty};
+
 use super::super::model;
 
 /// Whether the cut holds still, and what it does.
@@ -15,7 +17,7 @@ pub struct Outcome {
     pub engagement: MillingEngagement,
     /// Force, torque and power with undisturbed chips.
     pub force: MillingForces,
-    /// The leading Floquet multiplier; null where no verdict is asked for.
+    /// The leading Floquet multiplier; null where no verdict is asked for, and of a slow cut whose teeth or speed are uneven.
     pub multiplier: Option<LeadingMultiplier>,
     /// Modes of both sides in the axes of the cut, with their share in the disturbance.
     pub modes: Vec<ModeShare>,
@@ -34,6 +36,14 @@ pub struct Outcome {
     pub depth_line: Option<DepthLine>,
     /// Limits with one side or direction held rigid, each solved; only with the analysis `intervals`.
     pub limited_by: Option<RigidLimits>,
+    /// Sides of which frequency responses were measured: how well their modes are known. The modes themselves stand in `modes`.
+    pub measured: Vec<MeasuredSide>,
+    /// First limit by the measured lines themselves in place of the modes that were made of them, to half a percent; only with the
+    /// analysis `intervals`.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub limit_by_receptance_mm: Option<f64>,
+    /// Whether there is such a limit, and why not; null where nothing was measured, or intervals are not asked for.
+    pub receptance_limit: Option<ReceptanceLimit>,
     /// Limits with another floor of the chip, or without process damping; only with the analysis `intervals`.
     pub other_assumptions: OtherAssumptions,
     /// The least limit over all speeds by the mean cutting stiffness. No bound: the true limit may lie below. Null where nothing yields.
@@ -79,6 +89,8 @@ pub enum MillingState {
     Stable,
     /// A disturbance grows.
     Chatter,
+    /// A disturbance dies out from tooth to tooth, after growing fifty times and more between two: it marks the surface.
+    GrowsWithin,
     /// The multiplier differs from 1 by less than its error.
     Undecided,
     /// The clamp force at hand lets the workpiece slip at the lowest friction, as a whole or at single contacts.
@@ -250,6 +262,11 @@ pub struct LeadingMultiplier {
     pub chatter_frequency_hz: Option<f64>,
     /// Frequencies at which the disturbance swings, by falling share.
     pub aliases: Vec<FrequencyShare>,
+    /// How many times a disturbance grows at most on its way, although it may die out from period to period; at most 1e300 is told. Of
+    /// a slow cut: a steady ripple between two teeth. With a varying speed: the leading disturbance from one tooth to a later one. From
+    /// fifty on it marks the surface. Null for other cuts.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub transient_growth: Option<f64>,
 }
 
 /// A frequency with its share of the mean square of the disturbance.
@@ -370,8 +387,20 @@ pub struct UnstableInterval {
     /// Above its end: stable there.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub to_high_mm: Option<f64>,
-    /// Whether all of these brackets hold for the error of the modulus.
+    /// By what it was found.
+    pub found_by: CrossingMethod,
+    /// Whether all of these brackets hold for the error of the modulus; never of a closed form, which has none.
     pub certified: bool,
+}
+
+/// By what the ends of an unstable stretch were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CrossingMethod {
+    /// By the Floquet multiplier, with a bracket.
+    Multiplier,
+    /// By the closed form of a slow cut.
+    ClosedForm,
 }
 
 /// Growth over the depth at one speed.
@@ -408,6 +437,53 @@ pub struct RigidLimits {
     /// How deep was looked.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub examined_to_mm: f64,
+}
+
+/// A side of which frequency responses were measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MeasuredSide {
+    /// Which.
+    pub side: YieldingSide,
+    /// How well each of its modes is known, in the order of `modes`.
+    pub certainty: Vec<ModeCertainty>,
+    /// Largest share that the modes leave of a function.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub largest_residual_share: f64,
+    /// Directions that were fitted together, and how many modes they ask for.
+    pub groups: Vec<FittedGroup>,
+    /// How well each function is met.
+    pub functions: Vec<FittedFunction>,
+    /// Directions, along the axes of the fixture, of which nothing was measured: there this side counts as rigid.
+    pub rigid_directions: Vec<Direction>,
+}
+
+/// Whether there is a limit by measured lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReceptanceLimit {
+    /// There is.
+    Found,
+    /// None up to `examined_to_mm`.
+    NoneExamined,
+    /// Not solved: teeth differ.
+    UnevenTeeth,
+    /// Not solved: the speed varies.
+    VaryingSpeed,
+    /// Not solved: the modes reach beyond the twelfth multiple of the tooth frequency.
+    TooSlow,
+}
+
+impl ReceptanceLimit {
+    /// Its name, as in the contract.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Found => "found",
+            Self::NoneExamined => "none_examined",
+            Self::UnevenTeeth => "uneven_teeth",
+            Self::VaryingSpeed => "varying_speed",
+            Self::TooSlow => "too_slow",
+        }
+    }
 }
 
 /// First limits under other assumptions; null where the assumption plays no part, or no limit was found up to `examined_to_mm`.
@@ -510,6 +586,10 @@ pub struct MillingClamping {
     /// The same by the mean force of the cut.
     #[schema(extensions(("x-unit" = json!("N"))))]
     pub certain_slip_by_mean_n: Option<f64>,
+    /// Places of the cut, in the order in which they are numbered, and what each asks for.
+    pub stations: Vec<ClampStation>,
+    /// Whether the job states no place but the first, so that the ends of the way along the feed were taken.
+    pub stations_assumed: bool,
     /// What asks for the least clamp force; null where none holds, or nothing asks for any.
     pub decides: Option<ClampDeciding>,
     /// Factor on the loads at which a contact slips or opens; null without a clamp force at hand.
@@ -538,6 +618,23 @@ pub struct MillingClamping {
     pub over_turn: ClampTurn,
     /// What would hold where no clamp force does; it was solved.
     pub remedy: Option<ClampRemedy>,
+}
+
+/// A place of the cut.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ClampStation {
+    /// Where, along X of the fixture.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub x_mm: f64,
+    /// Along Y.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub y_mm: f64,
+    /// Along Z.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub z_mm: f64,
+    /// Least clamp force that holds while the cut acts there; null where none holds.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_min_n: Option<f64>,
 }
 
 /// How a clamp force holds.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::calculator::{Failure, Message, checkpoint};
 use crate::fixture_stability::power_kw;
 
-use super::super::job::{CutLimits, Held};
+use super::super::job::{Case, CutLimits, Held};
 use super::super::model::{Cut, Mode, Rotation, Structure, statics};
 use super::clamping::is_enough;
 use super::lobes::{Row, rotation_at};
@@ -69,13 +69,30 @@ pub(super) fn speeds(
         let pocket = tried(study, printed_speed(rows[k].spindle_rpm), depth)?;
         found.extend(pocket.filter(|pocket| pocket.removal_rate_cm3_per_min > least));
     }
-    // By removal rate; of equal ones the shallower cut pushes less.
+    Ok((ranked(found), curve))
+}
+
+/// The best by removal rate; of equal ones the shallower cut pushes less.
+pub(super) fn ranked(mut found: Vec<SpeedPocket>) -> Vec<SpeedPocket> {
     found.sort_by(|a, b| {
         let (p, q) = (a.removal_rate_cm3_per_min, b.removal_rate_cm3_per_min);
         if (p / q - 1.0).abs() < SAME { a.depth_mm.total_cmp(&b.depth_mm) } else { q.total_cmp(&p) }
     });
     found.truncate(TOLD);
-    Ok((found, curve))
+    found
+}
+
+/// The best speeds with each of the other widths that may be cut (`milling/7.26`).
+pub(super) fn of_other_widths(study: &Study<'_>, outcome: &Outcome) -> Result<Vec<SpeedPocket>, Failure> {
+    let mut found = Vec::new();
+    for job in study.job.with_other_widths() {
+        checkpoint(study.monitor)?;
+        let case = Case::of(&job).ok_or_else(|| Failure::Internal("a width that the check refuses".to_owned()))?;
+        let other = Study::new(&job, case, Vec::new(), study.monitor)?;
+        let rows = super::lobes::rows(&other)?;
+        found.extend(speeds(&other, &rows, outcome)?.0);
+    }
+    Ok(found)
 }
 
 fn removal(study: &Study<'_>, spindle_rpm: f64, depth_mm: f64) -> f64 {
@@ -208,8 +225,7 @@ struct Left {
 fn left(study: &Study<'_>, rotation: Rotation, depth_mm: f64) -> Result<Option<Left>, Failure> {
     let cut = Cut { rotation, depth_mm, ..study.cut() };
     let Some(forced) = study.orders.forced(&cut, study.monitor)? else { return Ok(None) };
-    let (low, high) = forced.extremes();
-    let swing = (0..3).map(|q| high[q] - low[q]).fold(0.0, f64::max);
+    let swing = forced.swing_mm();
     if swing > MODEL_ENDS * cut.milling.radius_mm {
         return Ok(None);
     }
@@ -276,7 +292,7 @@ fn tried(study: &Study<'_>, spindle_rpm: f64, depth: Depth) -> Result<Option<Spe
         removal_rate_cm3_per_min: removal(study, spindle_rpm, printed),
         binds: depth.binds,
         chatter_depth_mm: limit,
-        per_tooth: super::per_tooth(&found, study.teeth_per_period(&rotation)),
+        per_tooth: super::growth::per_tooth(&found, study.teeth_per_period(&rotation)),
         motor_power_kw: power_kw(torque, spindle_rpm) / efficiency,
         torque_n_m: torque,
         peak_to_peak_um: left.as_ref().map(|left| left.peak_to_peak_um),

@@ -27,13 +27,13 @@ pub(in crate::milling_stability) struct Case {
 }
 
 impl Case {
-    /// Of a job without faults; `None` of another.
+    /// Of a job without faults, whose measured sides have become modes; `None` of another.
     pub(in crate::milling_stability) fn of(job: &Job) -> Option<Self> {
         let (milling, spindle_rpm) = (milling(job)?, job.spindle_rpm()?);
         let rotation = rotation(job, &milling, spindle_rpm)?;
         let turn = job.cut.feed_direction_deg.to_radians();
         let mut modes = Vec::new();
-        for (side, yielding) in [(Side::Tool, &job.tool), (Side::Work, &job.work)] {
+        for (_, side, yielding) in job.sides() {
             match yielding {
                 Yielding::Modes(of) => {
                     for one in &of.modes {
@@ -41,6 +41,7 @@ impl Case {
                     }
                 }
                 Yielding::Vise(of) => modes.push(of_vise(&of.fixture, side)?),
+                Yielding::Receptances(_) => return None,
                 Yielding::Rigid(_) => {}
             }
         }
@@ -240,10 +241,14 @@ impl YieldingMode {
 
 fn mode(mode: &YieldingMode, side: Side, turn_rad: f64) -> Option<Mode> {
     let (frequency_hz, mass_kg, damping_ratio) = numbers(mode)?;
-    let [x, y, z] = direction(mode)?;
-    let (sin, cos) = turn_rad.sin_cos();
-    let direction = [x * cos + y * sin, y * cos - x * sin, z];
+    let direction = in_the_cut(direction(mode)?, turn_rad);
     Some(Mode { side, direction, frequency_hz, damping_ratio, mass_kg })
+}
+
+/// A vector in the axes of the fixture in those of a cut whose feed is turned by so much.
+pub(super) fn in_the_cut([x, y, z]: Vector, turn_rad: f64) -> Vector {
+    let (sin, cos) = turn_rad.sin_cos();
+    [x * cos + y * sin, y * cos - x * sin, z]
 }
 
 /// The workpiece between both joints of a vise whose screw locks itself: one mode along the feed. A jaw that a cylinder presses is a

@@ -5,17 +5,18 @@ use std::f64::consts::PI;
 use crate::calculator::{Check, Finding, Violations};
 use crate::clamping::Unheld;
 use crate::fixture_stability::{Vise, check_characteristic, check_friction};
+use crate::receptance_fit::{Function, check_at};
 
-use super::super::model::MOST_OSCILLATIONS;
-use super::super::model::Rotation;
-use super::case::{Case, arc_rad, coefficient, direction, milling, numbers, range_rpm, varying};
-use super::input::{Asked, EdgeForce, Job, Yielding, YieldingMode};
+use super::super::model::{MOST_OSCILLATIONS, Rotation, Vector};
+use super::case::{Case, arc_rad, coefficient, direction, in_the_cut, milling, numbers, range_rpm, varying};
+use super::input::{Asked, Cut, EdgeForce, Job, Yielding, YieldingMode};
 
 /// Codes of the faults found here, and those that fields name for their range.
 pub(in crate::milling_stability) const CODES: &[&str] = &[
     "arc_empty",
     "arc_or_width",
     "strip_misses_cutter",
+    "widths_beside_width",
     "spindle_speed_or_speed",
     "feed_missing",
     "feeds_disagree",
@@ -34,6 +35,7 @@ pub(in crate::milling_stability) const CODES: &[&str] = &[
     "clamping_missing",
     "vise_or_contacts",
     "frictions_unordered",
+    "friction_range_or_sd",
     "nothing_clamped",
     "clamping_unbalanced",
     "bad_clamp_force",
@@ -61,8 +63,9 @@ impl Check for Job {
         check_cutter(self, violations);
         check_cut(self, violations);
         check_sides(self, violations);
+        let measured = check_receptances(self, violations);
         check_clamping(self, violations);
-        check_force(self, violations);
+        check_force(self, &measured, violations);
         check_spindle(self, violations);
         check_cost(self, violations);
     }
@@ -118,6 +121,20 @@ fn check_cut(job: &Job, violations: &mut Violations) {
             Finding::new("strip_misses_cutter", "/cut/offset_mm").measured(cut.offset_mm.abs(), reach, "mm")
         });
     }
+    violations.require(cut.widths_mm.is_empty() || cut.width_mm.is_some(), || {
+        Finding::new("widths_beside_width", "/cut/widths_mm")
+    });
+    for (index, width) in cut.widths_mm.iter().enumerate().filter(|_| one && cut.width_mm.is_some()) {
+        let other = Cut { width_mm: Some(width.0), ..cut.clone() };
+        violations.require(arc_rad(&job.cutter, &other).is_some(), || {
+            let reach = 0.5 * (job.cutter.diameter_mm + width.0);
+            Finding::new("strip_misses_cutter", format!("/cut/widths_mm/{index}")).measured(
+                cut.offset_mm.abs(),
+                reach,
+                "mm",
+            )
+        });
+    }
     violations.require(cut.spindle_speed_rpm.is_some() != cut.speed_m_per_min.is_some(), || {
         let given = if cut.speed_m_per_min.is_some() { "both" } else { "neither" };
         Finding::new("spindle_speed_or_speed", "/cut").with("given", given)
@@ -137,10 +154,10 @@ fn check_cut(job: &Job, violations: &mut Violations) {
 
 /// Modes of both sides with where they stand.
 pub(in crate::milling_stability) fn modes(job: &Job) -> impl Iterator<Item = (String, &YieldingMode)> {
-    [("/tool", &job.tool), ("/work", &job.work)].into_iter().flat_map(|(side, yielding)| {
+    job.sides().into_iter().flat_map(|(side, _, yielding)| {
         let modes = match yielding {
             Yielding::Modes(of) => of.modes.as_slice(),
-            Yielding::Vise(_) | Yielding::Rigid(_) => &[],
+            Yielding::Receptances(_) | Yielding::Vise(_) | Yielding::Rigid(_) => &[],
         };
         modes.iter().enumerate().map(move |(index, mode)| (format!("{side}/modes/{index}"), mode))
     })
@@ -178,7 +195,7 @@ fn check_sides(job: &Job, violations: &mut Violations) {
         }
     }
     let mut has_vise = false;
-    for (at, yielding) in [("/tool", &job.tool), ("/work", &job.work)] {
+    for (at, _, yielding) in job.sides() {
         let Yielding::Vise(of) = yielding else { continue };
         has_vise = true;
         violations.require(matches!(of.fixture, Vise::SelfLocking(_)), || {
@@ -186,8 +203,19 @@ fn check_sides(job: &Job, violations: &mut Violations) {
         });
         violations.require(at == "/work", || Finding::new("vise_holds_work", at));
     }
-    let yields = has_vise || modes(job).next().is_some();
+    let yields = has_vise || job.is_measured() || modes(job).next().is_some();
     violations.require(!job.asks_stability() || yields, || Finding::new("nothing_yields", "/tool"));
+}
+
+/// Faults of measured functions at their places. Gives the functions that were read, along the axes of the fixture.
+fn check_receptances(job: &Job, violations: &mut Violations) -> Vec<Function> {
+    let mut read = Vec::new();
+    for (at, _, yielding) in job.sides() {
+        if let Yielding::Receptances(of) = yielding {
+            read.extend(check_at(&of.fit_job(), at, violations));
+        }
+    }
+    read
 }
 
 /// Ways in which a part may go, as words.
@@ -218,7 +246,7 @@ fn check_clamping(job: &Job, violations: &mut Violations) {
             Finding::new("direction_zero", format!("/clamping/contacts/points/{index}/normal"))
         });
     }
-    match clamping.held() {
+    match clamping.held(job.cut.feed_direction_deg) {
         Some(Err(Unheld::NothingClamped)) => {
             violations.add(Finding::new("nothing_clamped", "/clamping/contacts/points"));
         }
@@ -229,7 +257,7 @@ fn check_clamping(job: &Job, violations: &mut Violations) {
     }
 }
 
-fn check_force(job: &Job, violations: &mut Violations) {
+fn check_force(job: &Job, measured: &[Function], violations: &mut Violations) {
     let (floor, exponent, at) = match &job.force {
         EdgeForce::Mechanistic(_) => (1.0, 0.0, ""),
         EdgeForce::Kienzle(of) => {
@@ -239,11 +267,15 @@ fn check_force(job: &Job, violations: &mut Violations) {
         EdgeForce::PowerLaw(of) => (of.chip_floor_mm, of.chip_thickness_exponent, "/force/chip_floor_mm"),
     };
     let turn = job.cut.feed_direction_deg.to_radians();
-    let is_across = |mode: &YieldingMode| {
-        direction(mode).is_some_and(|[x, y, z]| (y * turn.cos() - x * turn.sin()).abs() > ACROSS || z.abs() > ACROSS)
+    let is_across = |of: Vector| {
+        let [_, y, z] = in_the_cut(of, turn);
+        y.abs() > ACROSS || z.abs() > ACROSS
     };
+    let of_function = |function: &Function| std::array::from_fn(|q| f64::from(u8::from(function.response.axis() == q)));
+    let yields_across = modes(job).filter_map(|(_, mode)| direction(mode)).any(is_across)
+        || measured.iter().map(of_function).any(is_across);
     let from_nothing = arc_rad(&job.cutter, &job.cut).is_some_and(|(entry, exit)| entry < 1e-9 || exit > PI - 1e-9);
-    let needed = exponent > 0.0 && from_nothing && modes(job).any(|(_, mode)| is_across(mode));
+    let needed = exponent > 0.0 && from_nothing && yields_across;
     violations.require(!needed || floor > 0.0, || {
         Finding::new("chip_floor_needed", at).measured(floor, USUAL_FLOOR_MM, "mm")
     });
@@ -275,21 +307,30 @@ fn check_spindle(job: &Job, violations: &mut Violations) {
 }
 
 /// A multiplier over thousands of oscillations is refused; a lobe diagram leaves such speeds out. Of a slow cut closed forms tell what
-/// is asked, but no other cutter is tried.
+/// is asked, but no other cutter is tried. Of a measured side it is known only when its modes are.
 fn check_cost(job: &Job, violations: &mut Violations) {
+    if let Some(finding) = Case::of(job).and_then(|case| too_expensive(job, &case)) {
+        violations.add(finding);
+    }
+}
+
+/// What is too dear at the working speed.
+pub(in crate::milling_stability) fn too_expensive(job: &Job, case: &Case) -> Option<Finding> {
     let at_speed =
         [Asked::Verdict, Asked::Intervals, Asked::Motion, Asked::Proposals].into_iter().any(|what| job.asks(what));
-    let Some(case) = Case::of(job).filter(|_| at_speed) else { return };
     let oscillations = case.oscillations();
     let is_told = case.cut().is_slow() && !job.asks(Asked::Proposals);
-    violations.require(is_told || oscillations <= MOST_OSCILLATIONS, || {
-        // Of a varying speed a period is some modulations, whatever the speed.
-        let steady = Rotation::steady(case.rotation.spindle_rpm);
-        let lowest = steady.spindle_rpm * case.oscillations_at(&steady) / MOST_OSCILLATIONS;
+    if !at_speed || is_told || oscillations <= MOST_OSCILLATIONS {
+        return None;
+    }
+    // Of a varying speed a period is some modulations, whatever the speed.
+    let steady = Rotation::steady(case.rotation.spindle_rpm);
+    let lowest = steady.spindle_rpm * case.oscillations_at(&steady) / MOST_OSCILLATIONS;
+    Some(
         Finding::new("too_expensive", "/cut/spindle_speed_rpm")
             .measured(oscillations, MOST_OSCILLATIONS, "1")
             .with("speed_rpm", case.rotation.spindle_rpm)
             .with("lowest_rpm", lowest)
-            .with("varies", if case.rotation.varies() { "yes" } else { "no" })
-    });
+            .with("varies", if case.rotation.varies() { "yes" } else { "no" }),
+    )
 }

@@ -5,12 +5,16 @@ use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::clamping::{Contact, Fixture, Rest, Unheld, Vector, Vise};
-use crate::fixture_stability::Friction;
+use crate::fixture_stability::{Friction, FrictionRange};
 
 use super::input::{DirectionPart, number};
 
 /// Standard gravity, m/s2.
 const GRAVITY: f64 = 9.806_65;
+/// Places nearer than this are one.
+const SAME_PLACE_MM: f64 = 1e-6;
+/// Cosine to an axis across below which a feed lies along the other one.
+const ALONG_AN_AXIS: f64 = 1e-9;
 
 /// How the workpiece is held, in the axes of the fixture, and where the cut pushes it: by a vise, or by contacts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -25,7 +29,8 @@ pub struct PartClamping {
     /// Where the cut acts on the workpiece.
     #[schema(min_items = 3, max_items = 3, example = json!([0.0, 0.0, 40.0]))]
     pub cut_point_mm: Vec<Coordinate>,
-    /// Further places along the path at which the same cut acts.
+    /// Further places along the path at which the same cut acts; left out, both ends and the middle of the way that leads along the feed
+    /// through the place of the cut over the workpiece between its jaws or contacts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 8)]
     pub stations: Vec<CutStation>,
@@ -166,6 +171,8 @@ pub(in crate::milling_stability) struct Held {
     pub friction: [Vec<f64>; 3],
     /// Where the cut acts.
     pub points_mm: Vec<Vector>,
+    /// Whether the job states no place but the first.
+    pub is_way_assumed: bool,
     pub safety: f64,
     pub clamp_force_n: Option<f64>,
 }
@@ -202,7 +209,7 @@ impl PartClamping {
                     jaw_height_mm: of.jaw_height_mm,
                     part_width_mm: of.part_width_mm,
                     parallels: of.parallels,
-                    friction: of.friction.low,
+                    friction: of.friction.range().low,
                     constant_force: of.constant_force,
                     weight_n,
                     centre_of_mass_mm,
@@ -217,27 +224,80 @@ impl PartClamping {
         }
     }
 
+    /// Where the cut acts: as stated, else along the feed.
+    pub(in crate::milling_stability) fn places_mm(&self, feed_direction_deg: f64) -> Option<Vec<Vector>> {
+        let cut_mm = vector(&self.cut_point_mm)?;
+        let stated = self.stations.iter().map(|at| [at.x_mm, at.y_mm, at.z_mm]);
+        let further = if self.stations.is_empty() { self.way_mm(cut_mm, feed_direction_deg) } else { stated.collect() };
+        let mut places = vec![cut_mm];
+        for place in further {
+            let is_there = |known: &Vector| (0..3).all(|q| (known[q] - place[q]).abs() < SAME_PLACE_MM);
+            if !places.iter().any(is_there) {
+                places.push(place);
+            }
+        }
+        Some(places)
+    }
+
+    /// Both ends and the middle of the way along the feed through the place of the cut, as far as the workpiece reaches for
+    /// certain: between the jaws over their length, or between the outermost contacts.
+    fn way_mm(&self, cut_mm: Vector, feed_direction_deg: f64) -> Vec<Vector> {
+        let (sin, cos) = feed_direction_deg.to_radians().sin_cos();
+        let Some(reach) = self.reach_mm() else { return Vec::new() };
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (q, along) in [cos, sin].into_iter().enumerate() {
+            let [low, high] = reach[q].map(|end| end - cut_mm[q]);
+            if along.abs() < ALONG_AN_AXIS {
+                if low > 0.0 || high < 0.0 {
+                    return Vec::new();
+                }
+                continue;
+            }
+            from = from.max((low / along).min(high / along));
+            to = to.min((low / along).max(high / along));
+        }
+        if from >= to {
+            return Vec::new();
+        }
+        let at = |way: f64| [cut_mm[0] + way * cos, cut_mm[1] + way * sin, cut_mm[2]];
+        vec![at(from), at(0.5 * (from + to)), at(to)]
+    }
+
+    /// From where to where the workpiece reaches at least along X and Y.
+    fn reach_mm(&self) -> Option<[[f64; 2]; 2]> {
+        if let Some(vise) = &self.vise {
+            return Some([vise.jaw_length_mm, vise.part_width_mm].map(|length| [-0.5 * length, 0.5 * length]));
+        }
+        let places: Vec<Vector> =
+            self.contacts.as_ref()?.points.iter().filter_map(|of| vector(&of.position_mm)).collect();
+        let ends = |q: usize| {
+            let along = places.iter().map(|place| place[q]);
+            [along.clone().fold(f64::INFINITY, f64::min), along.fold(f64::NEG_INFINITY, f64::max)]
+        };
+        Some([ends(0), ends(1)])
+    }
+
     /// What the kernel takes, or why the part does not stand; `None` of a job that is refused for its fields.
-    pub(in crate::milling_stability) fn held(&self) -> Option<Result<Held, Unheld>> {
+    pub(in crate::milling_stability) fn held(&self, feed_direction_deg: f64) -> Option<Result<Held, Unheld>> {
         let fixture = self.fixture()?;
-        let of = |pick: fn(&Friction) -> f64| -> Vec<f64> {
+        let of = |pick: fn(&FrictionRange) -> f64| -> Vec<f64> {
             match (&self.vise, &self.contacts) {
-                (Some(vise), _) => vec![pick(&vise.friction); fixture.contacts.len()],
+                (Some(vise), _) => vec![pick(&vise.friction.range()); fixture.contacts.len()],
                 (None, Some(of)) => {
-                    of.points.iter().map(|point| pick(point.friction.as_ref().unwrap_or(&of.friction))).collect()
+                    of.points.iter().map(|point| pick(&point.friction.unwrap_or(of.friction).range())).collect()
                 }
                 (None, None) => Vec::new(),
             }
         };
         let friction = [of(|one| one.low), of(|one| one.value), of(|one| one.high)];
-        let mut points_mm = vec![vector(&self.cut_point_mm)?];
-        points_mm.extend(self.stations.iter().map(|at| [at.x_mm, at.y_mm, at.z_mm]));
+        let points_mm = self.places_mm(feed_direction_deg)?;
         let clamp_force_n = self.clamp_force().map(|(force_n, _)| force_n);
         Some(Rest::of(&fixture).map(|rest| Held {
             fixture,
             rest,
             friction,
             points_mm,
+            is_way_assumed: self.stations.is_empty(),
             safety: self.safety,
             clamp_force_n,
         }))
@@ -254,7 +314,7 @@ impl GrippingPoint {
         Some(Contact {
             position_mm: vector(&self.position_mm)?,
             normal: self.direction()?,
-            friction: self.friction.unwrap_or(usual).low,
+            friction: self.friction.unwrap_or(usual).range().low,
             normal_stiffness_n_per_mm: self.normal_stiffness_n_per_mm,
             tangential_stiffness_n_per_mm: self.tangential_stiffness_n_per_mm,
             clamp_share: self.clamp_share,

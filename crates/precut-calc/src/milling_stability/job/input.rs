@@ -7,7 +7,9 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::fixture_stability::{Spindle, SpindlePoint, Vise};
 use crate::force::choice;
+use crate::receptance_fit::{Job as FitJob, ReceptanceFile, Residuals};
 
+use super::super::model::Side;
 use super::held::PartClamping;
 
 /// A cutter in a cut, what yields of tool and workpiece, and what is to be known before it.
@@ -96,6 +98,7 @@ pub(super) use number;
 number!(ToothPitch, "Angle from a tooth to the tooth before it, at the tip.", "deg", "theta_j", 0.1, 360.0, 90.0);
 number!(ToothHelix, "Helix angle of one tooth.", "deg", "eta_j", -80.0, 80.0, 30.0);
 number!(ToothOffset, "How far a tooth stands out or down.", "um", "rho_j", -1000.0, 1000.0, 10.0);
+number!(CutWidth, "Width of a milled strip.", "mm", "a_e", 0.001, 5000.0, 8.0);
 number!(DirectionPart, "Part of a direction along an axis of the fixture.", "1", "d", -1000.0, 1000.0, 1.0);
 
 /// A cutter whose teeth may be uneven.
@@ -285,6 +288,10 @@ pub struct Cut {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 0.001, maximum = 5000.0, example = 15.875, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("a_e"))))]
     pub width_mm: Option<f64>,
+    /// Other widths that may be cut, in the same way: the analysis `speeds` looks for the best of all of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 11, example = json!([8.0, 12.0]))]
+    pub widths_mm: Vec<CutWidth>,
     /// Where the strip lies: at the side at which teeth begin with no chip (up), end with none (down), or about the centre line.
     #[serde(default)]
     #[schema(default = "centred", example = "down")]
@@ -350,6 +357,8 @@ impl Milling {
 pub enum Yielding {
     /// Modes at the cut.
     Modes(YieldingModes),
+    /// Measured frequency responses at the cut, of which modes are made.
+    Receptances(YieldingReceptances),
     /// A vise along the feed, as the calculator of fixture stability takes it.
     Vise(YieldingVise),
     /// Nothing.
@@ -362,6 +371,7 @@ impl PartialSchema for Yielding {
             OneOfBuilder::new()
                 .description(Some("What yields of one side."))
                 .item(choice("modes", YieldingModes::schema()))
+                .item(choice("receptances", YieldingReceptances::schema()))
                 .item(choice("vise", YieldingVise::schema()))
                 .item(choice("rigid", NothingYields::schema()))
                 .build(),
@@ -372,6 +382,7 @@ impl PartialSchema for Yielding {
 impl ToSchema for Yielding {
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
         YieldingModes::schemas(schemas);
+        YieldingReceptances::schemas(schemas);
         YieldingVise::schemas(schemas);
         NothingYields::schemas(schemas);
     }
@@ -384,6 +395,40 @@ pub struct YieldingModes {
     /// In any order.
     #[schema(min_items = 1, max_items = 20)]
     pub modes: Vec<YieldingMode>,
+}
+
+/// Frequency responses at the cut, along X, Y and Z of the fixture: of one direction or several, with those across or without. A
+/// direction without any counts as rigid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct YieldingReceptances {
+    /// What was measured: CSV, or universal files with datasets 58 and 58b.
+    #[schema(min_items = 1, max_items = 16)]
+    pub files: Vec<ReceptanceFile>,
+    /// How many modes there are; as many as the lines ask for where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 20, example = 2, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("N")), ("x-advanced" = json!(true))))]
+    pub modes: Option<u32>,
+    /// Lines below it are left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1_000_000.0, example = 100.0, extensions(("x-unit" = json!("Hz")), ("x-symbol" = json!("f_1")), ("x-advanced" = json!(true))))]
+    pub from_hz: Option<f64>,
+    /// Lines above it are left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 0.0, maximum = 1_000_000.0, example = 2500.0, extensions(("x-unit" = json!("Hz")), ("x-symbol" = json!("f_2")), ("x-advanced" = json!(true))))]
+    pub to_hz: Option<f64>,
+    /// What modes beside the band leave in it.
+    #[serde(default)]
+    #[schema(default = "mass_and_stiffness", extensions(("x-advanced" = json!(true))))]
+    pub residuals: Residuals,
+}
+
+impl YieldingReceptances {
+    /// The same as the evaluation of frequency responses takes it.
+    pub(in crate::milling_stability) fn fit_job(&self) -> FitJob {
+        let Self { files, modes, from_hz, to_hz, residuals } = self;
+        FitJob { files: files.clone(), modes: *modes, from_hz: *from_hz, to_hz: *to_hz, residuals: *residuals }
+    }
 }
 
 /// A vise along the feed, as the calculator of fixture stability takes it.
@@ -653,5 +698,34 @@ impl Job {
         [Asked::Verdict, Asked::Intervals, Asked::Lobes, Asked::Speeds, Asked::Proposals]
             .into_iter()
             .any(|what| self.asks(what))
+    }
+
+    /// The job with each of the other widths in place of its own.
+    pub(in crate::milling_stability) fn with_other_widths(&self) -> Vec<Self> {
+        let own = self.cut.width_mm.unwrap_or(0.0);
+        let others = self.cut.widths_mm.iter().map(|of| of.0).filter(|width| (width - own).abs() > 0.0);
+        let with = |width_mm: f64| {
+            let cut = Cut { width_mm: Some(width_mm), widths_mm: Vec::new(), ..self.cut.clone() };
+            Self { cut, ..self.clone() }
+        };
+        others.map(with).collect()
+    }
+
+    /// Both sides with where they stand.
+    pub(in crate::milling_stability) fn sides(&self) -> [(&'static str, Side, &Yielding); 2] {
+        [("/tool", Side::Tool, &self.tool), ("/work", Side::Work, &self.work)]
+    }
+
+    /// One of both sides.
+    pub(in crate::milling_stability) fn side_mut(&mut self, side: Side) -> &mut Yielding {
+        match side {
+            Side::Tool => &mut self.tool,
+            Side::Work => &mut self.work,
+        }
+    }
+
+    /// Whether a side is given by its frequency responses.
+    pub(in crate::milling_stability) fn is_measured(&self) -> bool {
+        self.sides().iter().any(|(.., yielding)| matches!(yielding, Yielding::Receptances(_)))
     }
 }

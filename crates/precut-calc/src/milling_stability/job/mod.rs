@@ -4,13 +4,15 @@ mod case;
 mod check;
 mod held;
 mod input;
+mod measured;
 
 pub(super) use case::{Case, range_rpm, varying};
-pub(super) use check::{CODES, modes, way};
+pub(super) use check::{CODES, modes, too_expensive, way};
 pub(super) use held::Held;
 pub use held::{Coordinate, CutStation, GrippingContacts, GrippingPoint, GrippingVise, PartClamping};
 pub use input::{
-    Asked, Cut, CutLimits, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
+    Asked, Cut, CutLimits, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
     MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,
-    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingVise,
+    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
+pub(super) use measured::{Fit, fits, guessed};

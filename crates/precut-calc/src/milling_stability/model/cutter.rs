@@ -154,6 +154,13 @@ impl Milling {
         self.teeth.iter().any(differs)
     }
 
+    /// How much more the chips of one tooth are than those of another at most, by their offsets, mm.
+    pub fn run_out_mm(&self) -> f64 {
+        let (sin, cos) = self.edge_angle_rad.sin_cos();
+        let out = self.teeth.iter().map(|tooth| tooth.radial_mm * sin + tooth.axial_mm * cos);
+        out.clone().fold(f64::NEG_INFINITY, f64::max) - out.fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether all edges lag alike.
     pub fn has_one_helix(&self) -> bool {
         self.teeth.iter().all(|t| (t.lag_rad_per_mm - self.teeth[0].lag_rad_per_mm).abs() < 1e-15)

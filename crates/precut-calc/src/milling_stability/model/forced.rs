@@ -146,6 +146,12 @@ impl Forced<'_> {
         self.pressed.get(element).map_or([0.0; 3], |values| self.between(values, share))
     }
 
+    /// The largest peak-to-peak motion of a direction, mm.
+    pub fn swing_mm(&self) -> f64 {
+        let (low, high) = self.extremes();
+        (0..3).map(|q| high[q] - low[q]).fold(0.0, f64::max)
+    }
+
     /// Least and largest of each direction, mm.
     pub fn extremes(&self) -> (Vector, Vector) {
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);

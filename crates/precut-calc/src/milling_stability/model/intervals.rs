@@ -68,6 +68,14 @@ pub struct Scan {
 }
 
 impl Scan {
+    /// Of a cut that a closed form calls unstable from a depth on.
+    pub fn from_limit(depth_mm: f64) -> Self {
+        let multiplier = Multiplier { re: 0.0, im: 1.0, residual: 0.0 };
+        let bracket_mm = [depth_mm; 2];
+        let crossing = Crossing { depth_mm, enters: true, kind: Kind::Hopf, multiplier, bracket_mm, certified: false };
+        Self { crossings: vec![crossing], curve: Vec::new() }
+    }
+
     /// Depth at which it first becomes unstable, mm; 0 where it never was stable.
     pub fn first_mm(&self) -> Option<f64> {
         match self.crossings.first() {

@@ -2,6 +2,7 @@
 
 mod carried;
 mod cutter;
+mod direct;
 mod edge;
 mod forced;
 mod intervals;
@@ -11,12 +12,14 @@ mod multiplier;
 mod rotation;
 mod shares;
 mod slow;
+mod slow_period;
 mod statics;
 mod structure;
 mod zeroth;
 
 pub use carried::{Carried, Instant, Sampling};
 pub use cutter::{Law, Milling, Rubbing, Tensor, Tooth, Vector};
+pub use direct::{Direct, DirectLimit, MeasuredPair, NotDirect};
 pub use edge::{Edges, Engagement, Entry};
 pub use forced::{Forced, Roughness, Wall};
 pub use intervals::{Crossing, Scan, Search, Unstable, scan, unstable};
@@ -25,6 +28,7 @@ pub use multiplier::{Kind, Multiplier, Orders};
 pub use rotation::Rotation;
 pub use shares::{Alias, Shares};
 pub use slow::{MOST_OSCILLATIONS, slow_limit};
+pub use slow_period::{GROWN, SlowMultiplier};
 pub use statics::{Statics, statics};
 pub use structure::{Mode, Side, Structure};
 pub use zeroth::{Zeroth, mean_stiffness, zeroth};

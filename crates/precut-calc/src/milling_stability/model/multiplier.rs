@@ -5,8 +5,9 @@ use crate::num::dde::{Rule, largest_paced, largest_pair_paced};
 
 use super::forced::{Forced, forced};
 use super::map::{Cut, Map};
-use super::shares::{Shares, shares};
-use super::slow::slow_forced;
+use super::shares::{Shares, shares, transient_growth};
+use super::slow::{MOST_OSCILLATIONS, slow_forced};
+use super::slow_period::{SlowMultiplier, slow_multiplier};
 
 /// Points of an element, of the finer one that tells the error, and of one that does for a map.
 pub(super) const POINTS: usize = 12;
@@ -79,19 +80,48 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// The leading multiplier; `None` where the equations are singular.
+    /// The leading multiplier; `None` where the equations are singular. Of a slow cut that repeats from tooth to tooth it is the closed
+    /// form, and what grows fifty times between two teeth counts as one that grows.
     pub fn multiplier(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Multiplier>, Failure> {
+        if cut.is_slow() && cut.repeats() {
+            return Ok(Some(slow_multiplier(cut, false, monitor)?.counted()));
+        }
         leading(cut, &self.usual, TOLERANCE, monitor)
     }
 
     /// The same to about 2e-5 of the modulus: for maps.
     pub fn on_map(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Multiplier>, Failure> {
+        if cut.is_slow() && cut.repeats() {
+            return Ok(Some(slow_multiplier(cut, false, monitor)?.counted()));
+        }
         leading(cut, &self.coarse, COARSE_TOLERANCE, monitor)
+    }
+
+    /// The closed form of a slow cut that repeats from tooth to tooth, with its error: the estimate of the form itself, and what places
+    /// half as dense would change.
+    pub fn slow(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<SlowMultiplier, Failure> {
+        let usual = slow_multiplier(cut, false, monitor)?;
+        let finer = slow_multiplier(cut, true, monitor)?;
+        let moved = (usual.multiplier.modulus() - finer.multiplier.modulus()).abs();
+        Ok(SlowMultiplier { modulus_error: finer.modulus_error + moved, ..finer })
     }
 
     /// Frequencies and modes of the disturbance that grows most or decays least (`milling/4.19`); `None` where there is none or
     /// the period is so long that its aliases lie side by side.
     pub fn shares(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Shares>, Failure> {
+        let Some((map, found, vector)) = self.leading_pair(cut, monitor)? else { return Ok(None) };
+        shares(cut, &map, (found.re, found.im), &vector, POINTS, monitor)
+    }
+
+    /// How many times the leading disturbance grows at most from one tooth to a later one within a period (`milling/4.18`); `None`
+    /// where there is none.
+    pub fn transient_growth(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<f64>, Failure> {
+        let pair = self.leading_pair(cut, monitor)?;
+        Ok(pair.map(|(map, found, vector)| transient_growth(cut, &map, found.modulus(), &vector, POINTS)))
+    }
+
+    /// The map with its leading eigenvalue and eigenvector.
+    fn leading_pair(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Pair>, Failure> {
         let Some(map) = Map::new(cut, &self.usual, monitor)? else { return Ok(None) };
         let mut pace = Pace::new(monitor);
         let mut applying = Pace::new(monitor);
@@ -101,13 +131,14 @@ impl Orders {
         };
         let (found, vector) =
             largest_pair_paced(map.dimension(), POWER_STEPS, TOLERANCE, apply, |done| pace.work(done))?;
-        let Some(vector) = vector else { return Ok(None) };
-        shares(cut, &map, (found.re, found.im), &vector, POINTS, monitor)
+        let found = Multiplier { re: found.re, im: found.im, residual: found.residual };
+        Ok(vector.map(|vector| (map, found, vector)))
     }
 
     /// The motion that repeats itself from period to period (`milling/4.20`); `None` where there is none.
     pub fn forced<'a>(&'a self, cut: &'a Cut<'a>, monitor: &dyn Monitor) -> Result<Option<Forced<'a>>, Failure> {
-        if cut.is_slow() {
+        // Without waves elements are cheap up to there.
+        if cut.is_slow() && cut.oscillations() > MOST_OSCILLATIONS {
             return Ok(Some(slow_forced(cut, &self.usual, monitor)?));
         }
         forced(cut, &self.usual, monitor)
@@ -116,6 +147,10 @@ impl Orders {
     /// The same with its error in the modulus: against elements of a higher order, and what its eigenpair leaves times the
     /// condition of the eigenvalue, by its left and right vector.
     pub fn with_error(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<(Multiplier, f64)>, Failure> {
+        if cut.is_slow() && cut.repeats() {
+            let slow = self.slow(cut, monitor)?;
+            return Ok(Some((slow.counted(), slow.modulus_error)));
+        }
         let usual = conditioned(cut, &self.usual, monitor)?;
         let finer = leading(cut, &self.finer, TOLERANCE, monitor)?;
         Ok(usual.zip(finer).map(|((usual, condition), finer)| {
@@ -124,6 +159,9 @@ impl Orders {
         }))
     }
 }
+
+/// A map, its leading multiplier, and the real and imaginary part of its eigenvector.
+type Pair = (Map, Multiplier, (Vec<f64>, Vec<f64>));
 
 /// The leading multiplier and the condition of it as an eigenvalue, 1 at least.
 fn conditioned<const P: usize>(

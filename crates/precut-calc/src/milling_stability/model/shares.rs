@@ -115,3 +115,38 @@ pub(super) fn shares(
     aliases.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok(Some(Shares { aliases, energy: energy.iter().map(|one| one / stored).collect() }))
 }
+
+/// How many times the disturbance of an eigenvector grows at most from one tooth to a later one within a period: by the mean square of
+/// the motion over the pitch of a tooth. Beyond the end of the period it goes on as the multiplier says.
+pub(super) fn transient_growth(
+    cut: &Cut<'_>,
+    map: &Map,
+    modulus: f64,
+    vector: &(Vec<f64>, Vec<f64>),
+    points: usize,
+) -> f64 {
+    let d = cut.structure.basis.len();
+    let (_, weights) = gauss_legendre(points);
+    let pitch_rad = TAU / cut.milling.teeth.len() as f64;
+    let whole = cut.rotation.rotation_rad(map.times[map.times.len() - 1]);
+    // Some dozens.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let count = (whole / pitch_rad).round().max(1.0) as usize;
+    // Square of the motion over time, and the time, tooth by tooth.
+    let mut teeth = vec![(0.0, 0.0); count];
+    for part in [&vector.0, &vector.1] {
+        map.apply_seen(&mut part.clone(), |element, force, state| {
+            let (from, to) = (map.times[element], map.times[element + 1]);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let tooth = (cut.rotation.rotation_rad(0.5 * (from + to)) / pitch_rad) as usize;
+            let motion = map.motion(element, force, state);
+            let square = motion.chunks_exact(d).zip(&weights).map(|(r, w)| w * r.iter().map(|x| x * x).sum::<f64>());
+            let known = &mut teeth[tooth.min(count - 1)];
+            (known.0, known.1) = (known.0 + square.sum::<f64>() * (to - from), known.1 + (to - from));
+        });
+    }
+    let size = |tooth: usize| (teeth[tooth].0 / teeth[tooth].1).sqrt();
+    let later = |tooth: usize| if tooth < count { size(tooth) } else { size(tooth - count) * modulus };
+    let of = |first: usize| (first + 1..first + count).map(move |tooth| later(tooth) / size(first));
+    (0..count).flat_map(of).filter(|growth| growth.is_finite()).fold(1.0, f64::max)
+}

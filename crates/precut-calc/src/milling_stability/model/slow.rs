@@ -1,5 +1,4 @@
-//! Slow cuts: over a hundred oscillations from tooth to tooth, and more in a period than a multiplier is computed over
-//! (`milling/4.21`).
+//! Slow cuts: over a hundred oscillations from tooth to tooth (`milling/4.21`).
 
 use std::f64::consts::TAU;
 
@@ -14,19 +13,26 @@ use super::forced::Forced;
 use super::map::Cut;
 use super::mesh::times_s;
 use super::multiplier::POINTS;
-use super::structure::{Side, Structure, dot};
+use super::slow_period::slow_margin;
+use super::structure::{Mode, Side, Structure, dot};
 use super::zeroth::{Zeroth, least, projected};
 
 /// Oscillations of the fastest mode in a period of the map up to which the multiplier is computed.
 pub const MOST_OSCILLATIONS: f64 = 2000.0;
 /// A cut is slow where so many go from tooth to tooth, too.
 const FROM_TOOTH: f64 = 120.0;
+/// Where every tooth is followed by one alike these are enough once a free vibration falls by so many factors of e between them.
+const DECAYS: f64 = 40.0;
 /// Places of a smooth stretch of the period at which the stiffness of the chips is looked at, and frequencies at each.
 const PLACES: u32 = 24;
 const FREQUENCIES: u32 = 240;
+/// First step beyond the depth at which something grows.
+const FIRST_STEP: f64 = 0.05;
 /// Steps toward the limit, and how near is enough.
 const STEPS: u32 = 60;
 const NEAR: f64 = 1e-7;
+/// Places between which growth begins tell a limit to a thousandth.
+const NEAR_MARGIN: f64 = 1e-5;
 /// Factors of e by which a ringing has died out: to 1e-8.
 const DIED_OUT: f64 = 18.5;
 /// Longest element times the angular frequency of what rings.
@@ -44,18 +50,83 @@ impl Cut<'_> {
         self.structure.fastest_rad_per_s() / TAU * self.rotation.period_s(self.milling.period_rad())
     }
 
-    /// Whether closed forms tell it, and no multiplier.
+    /// Whether closed forms tell it in place of elements in time.
     pub fn is_slow(&self) -> bool {
-        let turned = self.rotation.rotation_rad(self.rotation.period_s(self.milling.period_rad()));
-        let teeth = turned / TAU * self.milling.teeth.len() as f64;
-        let oscillations = self.oscillations();
-        oscillations > MOST_OSCILLATIONS && oscillations >= FROM_TOOTH * teeth
+        let (oscillations, decays) = in_a_tooth(self);
+        let dies_out = self.repeats() && self.milling.rubbing.is_none() && decays >= DECAYS;
+        oscillations >= FROM_TOOTH && (dies_out || self.oscillations() > MOST_OSCILLATIONS)
     }
+
+    /// Whether closed forms serve in the place of a slow cut: one with another structure.
+    pub fn is_as_slow(&self) -> bool {
+        in_a_tooth(self).0 >= FROM_TOOTH || self.oscillations() > MOST_OSCILLATIONS
+    }
+
+    /// Whether the closed form tells the multiplier of a slow cut, too: every tooth is followed by one alike.
+    pub fn repeats(&self) -> bool {
+        self.milling.teeth_are_alike() && !self.rotation.varies()
+    }
+}
+
+/// Oscillations of the fastest mode from tooth to tooth, and how many factors of e the slowest free vibration falls by meanwhile.
+pub(super) fn in_a_tooth(cut: &Cut<'_>) -> (f64, f64) {
+    let turned = cut.rotation.rotation_rad(cut.rotation.period_s(cut.milling.period_rad()));
+    let tooth_s = cut.rotation.period_s(cut.milling.period_rad()) * TAU / (turned * cut.milling.teeth.len() as f64);
+    let decay = |mode: &Mode| mode.damping_ratio * mode.rad_per_s();
+    let slowest = cut.structure.modes.iter().map(decay).reduce(f64::min).unwrap_or(0.0);
+    (cut.structure.fastest_rad_per_s() / TAU * tooth_s, slowest * tooth_s)
+}
+
+/// Depth at which a slow cut begins to chatter, and the frequency; `None` where it does not up to a depth. Where every tooth is
+/// followed by one alike that is where a disturbance grows from tooth to tooth, or fifty times between two; else where it begins to
+/// grow at some place of the arc.
+pub fn slow_limit(cut: &Cut<'_>, most_mm: f64, monitor: &dyn Monitor) -> Result<Option<Zeroth>, Failure> {
+    let growing = begins_to_grow(cut.milling, cut.structure, most_mm, monitor)?;
+    let Some(from) = growing.filter(|_| cut.repeats()) else { return Ok(growing) };
+    let mut pace = Pace::new(monitor);
+    let mut margin = |depth_mm: f64| slow_margin(&Cut { depth_mm, ..*cut }, &mut pace);
+    // Below nothing grows anywhere.
+    let (mut low, mut high) = ((from.depth_mm, margin(from.depth_mm)?), None);
+    let mut factor = 1.0 + FIRST_STEP;
+    while high.is_none() {
+        let depth_mm = (low.0 * factor).min(most_mm);
+        let found = margin(depth_mm)?;
+        if found.0 >= 0.0 {
+            high = Some((depth_mm, found));
+        } else if depth_mm >= most_mm {
+            return Ok(None);
+        } else {
+            low = (depth_mm, found);
+            factor = (factor * factor).min(2.0);
+        }
+    }
+    let Some(mut high) = high else { return Ok(None) };
+    // Inside the bracket only: the margin has a kink where the one growth passes the other.
+    let mut side = 0;
+    let (mut below, mut above) = (low.1.0, high.1.0);
+    for _ in 0..STEPS {
+        if high.0 - low.0 <= NEAR_MARGIN * high.0 {
+            break;
+        }
+        let share = (below / (below - above)).clamp(1e-3, 1.0 - 1e-3);
+        let depth_mm = low.0 + share * (high.0 - low.0);
+        let found = margin(depth_mm)?;
+        if found.0 >= 0.0 {
+            (high, above) = ((depth_mm, found), found.0);
+            below *= if side == 1 { 0.5 } else { 1.0 };
+            side = 1;
+        } else {
+            (low, below) = ((depth_mm, found), found.0);
+            above *= if side == -1 { 0.5 } else { 1.0 };
+            side = -1;
+        }
+    }
+    Ok(Some(Zeroth { depth_mm: high.0, frequency_hz: high.1.1 }))
 }
 
 /// Depth at which a disturbance begins to grow from tooth to tooth at some place of the arc, and its frequency: the stiffness of the
 /// chips is taken as it stands there, process damping is left out. `None` where none does up to a depth.
-pub fn slow_limit(
+fn begins_to_grow(
     milling: &Milling,
     structure: &Structure,
     most_mm: f64,

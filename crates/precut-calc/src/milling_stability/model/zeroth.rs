@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::num::quadrature::gauss_legendre;
 
 use super::cutter::{Milling, Tensor};
-use super::edge::{Edges, combined};
+use super::edge::{Edges, Engagement, combined};
 use super::structure::Structure;
 
 /// Frequencies of the search between two refinements.
@@ -33,22 +33,41 @@ pub fn mean_stiffness(milling: &Milling) -> Tensor {
         depth_exponent: 0.0,
         ..milling.clone()
     };
-    let edges = Edges::new(&straight, 1.0);
+    let mut mean = [[0.0; 3]; 3];
+    each_instant(&straight, 1.0, f64::INFINITY, |_, share, instant| {
+        for entry in &instant.entries {
+            mean = combined(&mean, 1.0, &entry.stiffness, share);
+        }
+    });
+    mean
+}
+
+/// Calls with Gauss points of a period of the cut: rotation, share of the period, what the edges do there. Pieces lie between breaks
+/// and are no longer than `longest_rad`.
+pub(super) fn each_instant(
+    milling: &Milling,
+    depth_mm: f64,
+    longest_rad: f64,
+    mut call: impl FnMut(f64, f64, &Engagement),
+) {
+    let edges = Edges::new(milling, depth_mm);
+    let period = milling.period_rad();
     let mut breaks = edges.rotations();
-    let period = straight.period_rad();
     breaks.extend([0.0, period]);
     breaks.sort_by(f64::total_cmp);
     let (points, weights) = gauss_legendre(POINTS);
-    let mut mean = [[0.0; 3]; 3];
     for pair in breaks.windows(2) {
-        for (c, w) in points.iter().zip(&weights) {
-            let instant = edges.at(pair[0] + c * (pair[1] - pair[0]));
-            for entry in instant.entries {
-                mean = combined(&mean, 1.0, &entry.stiffness, w * (pair[1] - pair[0]) / period);
+        let count = ((pair[1] - pair[0]) / longest_rad).ceil().max(1.0);
+        let length = (pair[1] - pair[0]) / count;
+        let mut piece = 0.0;
+        while piece < count {
+            for (c, w) in points.iter().zip(&weights) {
+                let rotation = pair[0] + (piece + c) * length;
+                call(rotation, w * length / period, &edges.at(rotation));
             }
+            piece += 1.0;
         }
     }
-    mean
 }
 
 /// The least depth over all speeds; `None` where the mean drives nothing.
@@ -85,6 +104,13 @@ pub(super) fn least(structure: &Structure, w: &DMatrix<f64>, frequencies: u32) -
 
 /// The largest positive real part of an eigenvalue of G W.
 fn largest_real_part(structure: &Structure, w: &DMatrix<f64>, rad_per_s: f64) -> Option<f64> {
+    let product = modal(structure, rad_per_s) * w.map(|x| Complex::new(x, 0.0));
+    let values = product.schur().eigenvalues()?;
+    values.iter().map(|value| value.re).filter(|re| *re > 0.0).max_by(f64::total_cmp)
+}
+
+/// Receptance of all modes in the basis of the motion, mm/N.
+pub(super) fn modal(structure: &Structure, rad_per_s: f64) -> DMatrix<Complex<f64>> {
     let d = structure.basis.len();
     let mut g: DMatrix<Complex<f64>> = DMatrix::zeros(d, d);
     for (mode, along) in structure.modes.iter().zip(&structure.directions) {
@@ -95,7 +121,5 @@ fn largest_real_part(structure: &Structure, w: &DMatrix<f64>, rad_per_s: f64) ->
             }
         }
     }
-    let product = g * w.map(|x| Complex::new(x, 0.0));
-    let values = product.schur().eigenvalues()?;
-    values.iter().map(|value| value.re).filter(|re| *re > 0.0).max_by(f64::total_cmp)
+    g
 }

@@ -36,6 +36,17 @@ pub struct SlowMultiplier {
     pub rad_per_s: f64,
 }
 
+/// Growth of a disturbance that comes back with its own size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlowGrowth {
+    /// Logarithm of the growth over the period, of the sign of ln |mu|.
+    pub ln_whole: f64,
+    /// Logarithm of the largest growth inside the period; 0 where nothing grows anywhere.
+    pub ln_within: f64,
+    /// Angular frequency where it grows most, rad/s.
+    pub rad_per_s: f64,
+}
+
 /// Growth over the period at one multiplier.
 #[derive(Clone, Copy)]
 struct Growth {
@@ -84,6 +95,12 @@ impl SlowPeriod<'_> {
         }
         let (growth, phase) = found;
         Ok(SlowMultiplier { ln_modulus, angle_rad: phase, ln_within, rad_per_s: growth.rad_per_s })
+    }
+
+    /// What becomes of a disturbance that comes back with its own size: whether the multiplier is above 1, without finding it.
+    pub fn at_one<E>(&self, mut look: impl FnMut() -> Result<(), E>) -> Result<SlowGrowth, E> {
+        let (growth, _, ln_within) = self.fastest(0.0, &mut look)?;
+        Ok(SlowGrowth { ln_whole: growth.whole, ln_within, rad_per_s: growth.rad_per_s })
     }
 
     /// Over the phases of a multiplier of one modulus: the fastest growth with its phase, and the largest growth inside the period.
