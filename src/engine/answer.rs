@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use precut_calc::calculator::{Cost, Figure, Place, Program, ReturnedProgram, Table};
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::error::Error;
@@ -122,6 +123,26 @@ impl Stored {
             Value::String(word) => Some(word),
             other => Some(other.to_string()),
         }
+    }
+    /// How probably all its limits are kept, where the answer tells.
+    pub(crate) fn probability(&self) -> Option<f64> {
+        #[derive(Deserialize)]
+        struct Told {
+            conformance: Option<Conformance>,
+        }
+        #[derive(Deserialize)]
+        struct Conformance {
+            joint: Option<Joint>,
+            joint_probability: Option<f64>,
+        }
+        #[derive(Deserialize)]
+        struct Joint {
+            probability: f64,
+        }
+        let place = super::json::top_level_field(&self.body, "result")?;
+        let told: Told = serde_json::from_slice(&self.body[place]).ok()?;
+        let Conformance { joint, joint_probability } = told.conformance?;
+        joint.map(|joint| joint.probability).or(joint_probability)
     }
     /// What tells its job from others of the same calculator; nothing of a very large job.
     pub(crate) fn marks(&self) -> Vec<Mark> {

@@ -21,7 +21,7 @@ use super::query::Query;
 use super::{CACHE_STATE, codes, parts, report};
 use crate::engine::{CacheState, ENGINE_VERSION, Stored, Timings};
 use crate::render;
-use crate::text::{Glossary, Language, Texts, fingerprint};
+use crate::text::{Glossary, Language, Texts, fingerprint, significant};
 
 const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
@@ -342,6 +342,9 @@ fn program_header(stored: &Stored) -> Vec<String> {
         format!("precut {} {} version {}", said("engine"), said("calculator"), said("version")),
         format!("result {}", stored.key),
     ];
+    header.extend(
+        stored.probability().map(|kept| format!("within all limits with probability {}", significant(kept, 4))),
+    );
     let warnings: Vec<Warning> = serde_json::from_str(&said("warnings")).unwrap_or_default();
     header.extend(warnings.iter().map(|warning| format!("WARNING {}: {}", warning.code, warning.detail)));
     header

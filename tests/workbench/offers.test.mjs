@@ -190,6 +190,15 @@ test('the sheet of the next measurement comes back as rows of a run that was not
   assert.equal(both, 'run\tz_mm\tdeviation_um\n1\t5\t2\n2\t10\t4.5\n2\t20.5\t5\n');
 });
 
+test('runs that are planned together stand under each other, each with its number', () => {
+  const further = { changes: 'way', run: { way: 'to' }, rows: 1, places: { z_mm: [10] } };
+  const planned = { next_measurement: { ...answer.result.next_measurement, further_runs: [further] } };
+  const sheet = sheetOf({ input_schema: root }, { ...answer, result: planned }, answer.input);
+  assert.deepEqual(sheet.changes, ['depth_mm', 'way']);
+  const lines = csvOf(sheet).replace('\ufeff', '').trim().split('\r\n');
+  assert.deepEqual(lines.slice(-2), ['2,30,1.8,fro,', '3,10,,to,']);
+});
+
 test('no sheet where no measurement is advised', () => {
   assert.equal(sheetOf({ input_schema: root }, { ...answer, result: { next_measurement: null } }, answer.input), null);
 });

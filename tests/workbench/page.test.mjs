@@ -39,6 +39,7 @@ test('nothing in the page names a calculator', () => {
 const CAUSES = [
   'at_limit',
   'confounded_with',
+  'further_runs',
   'hump_ln',
   'likely_sets',
   'next_measurement',
@@ -46,6 +47,7 @@ const CAUSES = [
   'none_probability',
   'rmse_base',
   'rmse_extended',
+  'rows_needed',
   'separation_now_sigmas',
   'separation_then_sigmas',
   'standard_deviation',
@@ -54,7 +56,7 @@ const CAUSES = [
 ];
 const KNOWN = {
   'cause.js': CAUSES,
-  'inspection.js': ['next_measurement'],
+  'inspection.js': ['further_runs', 'next_measurement'],
   'digits.js': ['standard_deviation', 'standard_error'],
   'schema.js': ['n_per_mm'],
   'handles.js': ['per_unit'],

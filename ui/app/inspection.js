@@ -30,26 +30,47 @@ export function sheetOf({ input_schema: root }, { input, result }, job) {
     schema,
     cells,
   });
-  // Several points may be of one row.
-  const [first] = Object.values(next.places || {});
-  const count = first?.length ?? next.rows;
-  const same = value => Array.from({ length: count }, () => value);
+  const planned = [next, ...(next.further_runs ?? [])];
   const taken = lastRun(job[place], wanted(all), freeOf(all), runs, job[runs.list]);
-  const where = Object.entries(next.places || {})
-    .filter(([name]) => fields.has(name))
-    .map(([name, cells]) => told(name, fields.get(name), cells));
-  const under = Object.entries(next.run)
-    .filter(([name, value]) => value !== null && value !== undefined && !(name in (next.places || {})))
-    .flatMap(([name, value]) => {
-      if (isLevels(value)) return value.map(({ factor, level }) => told(factor, null, same(level)));
-      return Array.isArray(value) ? [] : [told(name, fields.get(name) ?? runs.fields.get(name) ?? { title: humanised(name) }, same(value))];
-    });
+  const ofRuns = planned.map((own, index) => ofRun(own, taken + 1 + index));
   return {
-    changes: next.changes.split(', '),
-    columns: [told(runs.number, fields.get(runs.number), same(taken + 1)), ...where, ...under],
-    measured: told(input.quantity, fields.get(input.quantity), same(null)),
-    count,
+    changes: planned.flatMap(({ changes }) => changes.split(', ')),
+    columns: joined(ofRuns),
+    measured: told(
+      input.quantity,
+      fields.get(input.quantity),
+      ofRuns.flatMap(({ count }) => Array(count).fill(null)),
+    ),
+    count: ofRuns.reduce((sum, { count }) => sum + count, 0),
   };
+
+  function ofRun(own, number) {
+    // Several points may be of one row.
+    const [first] = Object.values(own.places || {});
+    const count = first?.length ?? own.rows;
+    const same = value => Array(count).fill(value);
+    const where = Object.entries(own.places || {})
+      .filter(([name]) => fields.has(name))
+      .map(([name, cells]) => told(name, fields.get(name), cells));
+    const under = Object.entries(own.run)
+      .filter(([name, value]) => value !== null && value !== undefined && !(name in (own.places || {})))
+      .flatMap(([name, value]) => {
+        if (isLevels(value)) return value.map(({ factor, level }) => told(factor, null, same(level)));
+        return Array.isArray(value)
+          ? []
+          : [told(name, fields.get(name) ?? runs.fields.get(name) ?? { title: humanised(name) }, same(value))];
+      });
+    return { count, columns: [told(runs.number, fields.get(runs.number), same(number)), ...where, ...under] };
+  }
+}
+
+/** Columns of several runs under each other; what a run does not have is empty there. */
+function joined(ofRuns) {
+  const names = [...new Set(ofRuns.flatMap(({ columns }) => columns.map(({ name }) => name)))];
+  return names.map(name => {
+    const own = ofRuns.map(({ count, columns }) => columns.find(column => column.name === name) ?? { cells: Array(count).fill(null) });
+    return { ...own.find(column => column.name), cells: own.flatMap(({ cells }) => cells) };
+  });
 }
 
 /** Digits of a condition: what rounding left is none of it. */
