@@ -408,6 +408,11 @@ fn what_does_not_go_together_is_refused() {
     let refused_nose = refused(&bar(&nose, 100.0));
     assert_eq!(refused_nose.code, "nose_compensation_not_driven");
     assert_eq!(refused_nose.values.get("line").cloned(), Some(Said::from(7_usize)));
+    // A smaller nose, as is advised, goes along it, and so does a wider hollow.
+    let mut smaller = bar(&nose, 100.0);
+    smaller["tools"][0]["nose_radius_mm"] = json!(0.4);
+    assert!(solve(&smaller).output.surface.is_some());
+    assert!(solve(&bar(&nose.replace("X37. Z-50.5 R0.5", "X38. Z-51. R1."), 100.0)).output.surface.is_some());
     let good = bar(&format!("{HEAD}G0 X36. Z2.\nG1 Z-50. F0.2\nM30\n"), 100.0);
     let with = |pointer: &str, value: Value| {
         let mut job = good.clone();
