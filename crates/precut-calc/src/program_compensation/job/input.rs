@@ -432,7 +432,7 @@ pub struct Mode {
     pub stamp: bool,
     /// What the work is corrected to.
     #[serde(default)]
-    #[schema(inline, default = "program", example = "program", extensions(("x-advanced" = json!(true))))]
+    #[schema(default = "program", example = "program", extensions(("x-advanced" = json!(true))))]
     pub correct_to: CorrectTo,
 }
 
