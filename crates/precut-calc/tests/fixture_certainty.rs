@@ -184,8 +184,8 @@ fn is_quiet(job: &Value) -> bool {
     given >= clamp.least_n.unwrap() && clamp.slip.unwrap().holds.unwrap()
 }
 
-/// What is advised is done: the depth of the wanted probability has it, a half of a width makes of it what was told, the
-/// robust speed removes and holds what it says.
+/// What is advised is done: the depth of the wanted probability has it, a half of each of the three widths that matter most makes
+/// of it what was told, the robust speed removes and holds what it says.
 #[test]
 fn what_is_told_is_so_when_it_is_done() {
     let job = meant(&reference("x2-joints-and-slip"));
@@ -194,7 +194,7 @@ fn what_is_told_is_so_when_it_is_done() {
     let deep = conformance.depth_at_wanted_mm.unwrap();
     let (there, error) = told(&outcome(&with(&job, "/cut/depth_mm", json!(deep))), "all");
     assert!((there - 0.95).abs() < error + 0.003, "{deep} mm: {there} +- {error}");
-    for one in &conformance.contributions {
+    for one in conformance.contributions.iter().take(3) {
         let mut halved = job.clone();
         for stated in halved["uncertainty"]["quantities"].as_array_mut().unwrap() {
             if stated["quantity"] == json!(one.quantity) {
