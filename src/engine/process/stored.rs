@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use precut_calc::process::{Change, Decided, State};
+use precut_calc::process::{Change, ChangeVerdict, Decided, State};
 use serde_json::{Value, json};
 
 use super::ProcessError;
@@ -90,8 +90,8 @@ fn changes(state: &State) -> Vec<&Change> {
     state.changes.iter().filter(|change| change.accepted && change.decided != Some(Decided::Rejected)).collect()
 }
 
-/// What tells one set of them from another.
-fn joined(live: &Live) -> Vec<(String, u32, Option<Decided>)> {
+/// What tells one set of them from another: a change that later parts name is another one.
+fn joined(live: &Live) -> Vec<(String, u32, ChangeVerdict, Option<Decided>)> {
     let changes = live.last_said().map(changes).unwrap_or_default();
-    changes.into_iter().map(|change| (change.id.clone(), change.since_part, change.decided)).collect()
+    changes.into_iter().map(|change| (change.id.clone(), change.since_part, change.verdict, change.decided)).collect()
 }

@@ -272,15 +272,9 @@ fn result() -> OperationBuilder {
 fn follow() -> OperationBuilder {
     let text = "Events `state` and `done` with the job as data, `progress` with a `JobProgress`, `interim` with a figure \
                 of what is computed so far. At most five `progress` and `interim` each second.";
-    // OpenAPI 3.1 has no word for the items of a stream: as its tools have it, the schema is that of one event.
-    let string = |about: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(about));
-    let schema = ObjectBuilder::new()
-        .property("event", string("`state`, `progress`, `interim` or `done`."))
-        .property("id", string("Number of the event, for `Last-Event-ID`."))
-        .property("data", string("JSON: a `Job`, a `JobProgress` or a figure."))
-        .description(Some(text))
-        .build();
-    let stream = parts::success("The events, until the job is over.", "text/event-stream", Content::new(Some(schema)));
+    let stream =
+        parts::events(text, "`state`, `progress`, `interim` or `done`.", "JSON: a `Job`, a `JobProgress` or a figure.");
+    let stream = parts::success("The events, until the job is over.", "text/event-stream", stream);
     // Any text: what is no number of an event is as good as none.
     let last = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).build();
     let operation = operation(

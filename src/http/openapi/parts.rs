@@ -259,6 +259,17 @@ pub(super) fn json_of(schema: &str) -> Content {
     Content::new(Some(Ref::from_schema_name(schema)))
 }
 
+/// A stream of events. OpenAPI 3.1 has no word for its items: as its tools have it, the schema is that of one event.
+pub(super) fn events(about: &str, event: &str, data: &str) -> Content {
+    let string = |about: &str| ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(about));
+    let schema = ObjectBuilder::new()
+        .property("event", string(event))
+        .property("id", string("Number of the event, for `Last-Event-ID`."))
+        .property("data", string(data))
+        .description(Some(about));
+    Content::new(Some(schema.build()))
+}
+
 pub(super) fn text_of(text: &str) -> Content {
     let schema = ObjectBuilder::new().schema_type(SchemaType::new(Type::String)).description(Some(text)).build();
     Content::new(Some(schema))

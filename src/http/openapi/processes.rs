@@ -6,7 +6,7 @@ use utoipa::openapi::path::{HttpMethod, OperationBuilder, Parameter, ParameterIn
 use utoipa::openapi::request_body::{RequestBody, RequestBodyBuilder};
 use utoipa::openapi::response::ResponseBuilder;
 use utoipa::openapi::schema::{Object, ObjectBuilder, SchemaType, Type};
-use utoipa::openapi::{Content, Ref, RefOr, Required, Schema};
+use utoipa::openapi::{Ref, RefOr, Required, Schema};
 
 use super::{jobs, parts};
 use crate::engine::WhichPath;
@@ -619,8 +619,10 @@ fn gain() -> OperationBuilder {
 }
 
 fn events() -> OperationBuilder {
-    let stream: Content = parts::text_of(
-        "Events `document`, `part`, `withdrawn`, `decision`, `path` with the entry and its number as id; before them `warning`, `change`, `accepted`, `odd_part`, `replayed`.",
+    let stream = parts::events(
+        "Each entry of the record, and before it what is new with it.",
+        "`document`, `part`, `withdrawn`, `decision` or `path`; `warning`, `change`, `accepted`, `odd_part` or `replayed`.",
+        "JSON: `sequence`, `kind`, `part`, `number` and `said` of the entry.",
     );
     let operation = operation(
         "follow_process",
