@@ -191,6 +191,8 @@ async fn its_model_can_be_used_by_any_job() {
     problem(put(&server, &address, &other).await, 409, "model_of_process").await;
     assert_eq!(put(&server, "/v1/models/shaft-9", &other).await.status(), 201);
     problem(put(&server, "/v1/processes/shaft-9", &declared()).await, 409, "model_name_taken").await;
+    assert_eq!(server.client.delete(server.url("/v1/models/shaft-9")).send().await.unwrap().status(), 204);
+    assert_eq!(put(&server, "/v1/processes/shaft-9", &declared()).await.status(), 201, "as the refusal advises");
     // A decision that takes the change out of the model is in its next revision.
     let rejected = json!({ "decision": "reject" });
     let rejected = send(&server, Method::POST, "/v1/processes/shaft-560/changes/c1", &rejected).send().await.unwrap();

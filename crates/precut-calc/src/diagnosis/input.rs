@@ -110,11 +110,10 @@ pub struct DiagnosisOptions {
     /// How many runs are to be measured next, planned together.
     #[schema(minimum = 1, maximum = 4, default = 1, example = 1, extensions(("x-symbol" = json!("n_next")), ("x-unit" = json!("1"))))]
     pub next_runs: u8,
-    /// What a further run costs before anything is measured of it, in any unit of cost: runs are ranked by what it costs to settle
-    /// the question with them.
+    /// Cost of making one more run, in any unit. Runs are ranked by the cost of settling the question with them.
     #[schema(minimum = 1e-6, maximum = 1e9, default = 1.0, example = 1.0, extensions(("x-symbol" = json!("c_run")), ("x-unit" = json!("1"))))]
     pub cost_per_run: f64,
-    /// What a measured row of it costs, in the same unit.
+    /// Cost of each row measured in it, in the same unit.
     #[schema(minimum = 0.0, maximum = 1e9, default = 0.0, example = 0.0, extensions(("x-symbol" = json!("c_row")), ("x-unit" = json!("1"))))]
     pub cost_per_row: f64,
     /// Seed of the draws behind the intervals of decisions, and of the gain of classes.

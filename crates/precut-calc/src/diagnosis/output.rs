@@ -559,7 +559,7 @@ pub struct NextReport<R: ToSchema> {
     /// Rows of this kind that would bring odds of 20 to 1; absent where more than twenty such runs would be needed.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rows_needed: Option<u32>,
-    /// What it costs to bring odds of 20 to 1 with runs of this kind, in the unit of the stated costs; absent where more than twenty would be needed.
+    /// Cost of odds of 20 to 1 with runs of this kind, in the unit of the stated costs; absent where more than twenty would be needed.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub cost_to_settle: Option<f64>,
     /// Runs to measure with it, where several were asked for: fewer where a further one would add nothing.
@@ -609,7 +609,7 @@ pub struct CandidateReport<R: ToSchema> {
     /// Separation of leader and rival with this run measured too, sigmas.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub separation_sigmas: f64,
-    /// What it costs to bring odds of 20 to 1 with runs of this kind; absent where more than twenty would be needed.
+    /// Cost of odds of 20 to 1 with runs of this kind; absent where more than twenty would be needed.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub cost_to_settle: Option<f64>,
     /// Bayes factor to be expected from this run.

@@ -28,10 +28,9 @@ pub struct StoredModel<E> {
     pub with_profile: bool,
 }
 
-/// Which columns are effects of the model: changes that joined it, and causes that come and go with conditions where the parts
-/// tell of them. Of the others nothing is known but that they were there, as a part of all that has no name: a later job
-/// need not state conditions for them.
-fn acting(null: &Null) -> Vec<bool> {
+/// Which columns become effects: changes that joined the model, and causes that come and go with conditions where their 95 % interval
+/// does not hold 0. The others stay in what has no name, so that a later job need not state conditions for them.
+fn are_effects(null: &Null) -> Vec<bool> {
     let (mean, inverse) = (null.mean(), null.factor.inverse());
     let is_told = |k: usize| mean[k].abs() > NORMAL_95 * inverse[(k, k)].sqrt();
     (0..null.columns.len()).map(|k| null.columns[k].since.is_some() || is_told(k)).collect()
@@ -50,7 +49,7 @@ impl<M: Watched> Watch<M> {
         let of_null = memory.with_null(|told, null| {
             let all = null.rows_of(&ahead.part).into_iter().map(DVector::from_vec).collect::<Vec<_>>();
             let expected = memory.expected(&ahead.part, told, null).mean;
-            let chosen = acting(null);
+            let chosen = are_effects(null);
             let own = |amounts: &DVector<f64>| sizes(catalogue, null, amounts, number, &chosen);
             let count = null.columns.len();
             let unit = |k: usize| DVector::from_fn(count, |row, _| f64::from(u8::from(row == k)));
@@ -84,8 +83,8 @@ impl<M: Watched> Watch<M> {
         Ok(Some(StoredModel { effects, effects_uncertainty, part_type, with_profile }))
     }
 
-    /// What so much of every column does to the rows of a part; what the gauge reads is nothing of the part, and a mean profile is
-    /// left out where it is not asked for.
+    /// The shift of the rows of a part by these amounts of the columns. The gauge shifts readings, not the part; the mean profile
+    /// shifts it only where asked.
     fn shift(&self, null: &Null, rows: &[DVector<f64>], amounts: &DVector<f64>, with_profile: bool) -> DVector<f64> {
         let gauge = self.memory.catalogue.gauge();
         let acts = |source: Source| match source {
