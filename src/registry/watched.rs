@@ -1,7 +1,7 @@
 //! Processes under watch of a calculator, with its types closed over.
 
 use precut_calc::calculator::{
-    Calculator, Failure, Finding, ForwardModel, Measured, MeasuredRow, Measurement, Monitor, Watched,
+    Calculator, Failure, Finding, ForwardModel, Measured, MeasuredRow, Measurement, Monitor, Unwatched, Watched,
 };
 use precut_calc::process::{
     Decision, DocumentOf, GAUGE_SIZE, GaugeCheck, Options, Outlook, PartOf, State, Watch, faults,
@@ -21,6 +21,8 @@ pub(crate) struct Observed {
     pub(crate) replay: Replay,
     /// A process before its first part, by its document.
     pub(crate) begin: fn(Value) -> Result<Box<dyn Watching>, NotReplayed>,
+    /// A process as it was kept, by its document, what was kept, and its parts since the first that is needed.
+    pub(crate) resume: fn(Value, Value, Vec<Value>) -> Result<Box<dyn Watching>, NotReplayed>,
     /// Every fault of a document and of some parts, in whatever order.
     pub(crate) faults: fn(Value, Vec<Value>) -> Vec<Finding>,
     /// The path that a result commands, as conditions of a part that is cut on it; nothing where it commands none.
@@ -45,6 +47,7 @@ impl Observed {
         Self {
             replay: replay::<M>,
             begin: |document| Ok(Box::new(Watch::<M>::new(read(document, "")?))),
+            resume: resume::<M>,
             faults: |document, parts| read_all::<M>(document, parts).map_or_else(found, |(d, p)| faults::<M>(&d, &p)),
             commanded: |result| {
                 let output: <M as Calculator>::Output = serde_json::from_value(result).ok()?;
@@ -220,6 +223,8 @@ pub(crate) trait Watching: Send + Sync {
     fn stored(&mut self, monitor: &dyn Monitor) -> Result<Option<Value>, Failure>;
     /// What a person says of a change, and what is said then; nothing where that does not fit.
     fn decide(&mut self, change: &str, decision: &Decision) -> Option<State>;
+    /// What is kept of it, and the number of the first part that is needed to go on from there.
+    fn snapshot(&self) -> (Value, u32);
     /// The same once more.
     fn copy(&self) -> Box<dyn Watching>;
 }
@@ -260,6 +265,12 @@ impl<M: Watched> Watching for Watch<M> {
         Watch::decide(self, change, decision)
     }
 
+    fn snapshot(&self) -> (Value, u32) {
+        let snapshot = Watch::snapshot(self);
+        let first = snapshot.first_part().unwrap_or(u32::MAX);
+        (json!(snapshot), first)
+    }
+
     fn copy(&self) -> Box<dyn Watching> {
         Box::new(Watch::copy(self))
     }
@@ -296,6 +307,11 @@ fn replay<M: Watched>(mut process: Value, monitor: &dyn Monitor) -> Result<Repla
     }
     let (mut watch, states) = Watch::<M>::replay(document, &parts, monitor)?;
     Ok(Replayed { states, outlook: watch.outlook(monitor)? })
+}
+
+fn resume<M: Watched>(document: Value, kept: Value, parts: Vec<Value>) -> Result<Box<dyn Watching>, NotReplayed> {
+    let (document, parts) = read_all::<M>(document, parts)?;
+    Ok(Box::new(Watch::<M>::from_snapshot(document, read(kept, "")?, &parts, &Unwatched)?))
 }
 
 fn read_all<M: Watched>(document: Value, parts: Vec<Value>) -> Result<(DocumentOf<M>, Vec<PartOf<M>>), NotReplayed> {

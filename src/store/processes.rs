@@ -139,8 +139,22 @@ pub struct PartNow {
     pub now: String,
 }
 
+/// A process as it was after one of its parts, so that it need not be computed again from its first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Number of the part.
+    pub number: i64,
+    /// JSON.
+    pub content: String,
+}
+
+from_row!(Snapshot { number, content });
+
+/// So many snapshots of a process are kept, the last ones.
+pub const MOST_SNAPSHOTS: u32 = 4;
+
 /// What is added to a process.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Addition {
     /// Its name.
     pub process: String,
@@ -154,6 +168,8 @@ pub struct Addition {
     pub entries: Vec<NewEntry>,
     /// The parts of which something else is said now.
     pub parts: Vec<PartNow>,
+    /// The process as it is after some of the parts that are judged with this addition, of ascending numbers.
+    pub snapshots: Vec<Snapshot>,
     /// Who is told of which of the entries.
     pub tells: Vec<(usize, NewCallback)>,
     /// What is said of it now, JSON.
@@ -212,6 +228,12 @@ pub trait ProcessStore: Send + Sync + 'static {
     ) -> BoxFuture<'_, Result<Vec<KeptPart>, StoreError>>;
     /// A part, withdrawn or not.
     fn process_part(&self, name: String, part: String) -> BoxFuture<'_, Result<Option<KeptPart>, StoreError>>;
+    /// The last snapshot before a part of that number, or before the last part, since which nothing before it has changed.
+    fn process_snapshot(
+        &self,
+        name: String,
+        before: Option<i64>,
+    ) -> BoxFuture<'_, Result<Option<Snapshot>, StoreError>>;
     /// Adds to a process, or makes it; on the disk on return.
     fn add_to_process(&self, addition: Addition) -> BoxFuture<'_, Result<Added, StoreError>>;
     /// Deletes a process with its parts, if that is how far it is; numbers of its document are never given again.

@@ -1,11 +1,14 @@
 //! Processes under watch over HTTP: the reference stream of a tailstock that softens, fed part by part.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::sync::OnceLock;
 
 use precut::registry::Registry;
 use reqwest::{Method, RequestBuilder, Response};
 use serde_json::{Value, json};
+use sqlx::Connection as _;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 use crate::isolation::{As, with_keys};
 use crate::stream::process_file;
@@ -729,6 +732,60 @@ async fn killed_between_a_part_and_its_answer_it_has_lost_nothing() {
     }
     let state = client.get(service.url("/v1/processes/shaft-560/state")).send().await.unwrap();
     assert_eq!(state.json::<Value>().await.unwrap(), expected);
+    service.kill();
+}
+
+/// Changes what is on the disk of a service that stands.
+async fn change_on_disk(folder: &Path, statements: &[&str]) {
+    let options = SqliteConnectOptions::new().filename(folder.join("precut.db"));
+    let mut connection = SqliteConnection::connect_with(&options).await.unwrap();
+    for statement in statements {
+        let changed = sqlx::query(sqlx::AssertSqlSafe(*statement)).execute(&mut connection).await.unwrap();
+        assert!(changed.rows_affected() > 0, "{statement}");
+    }
+    connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn started_again_it_goes_on_from_its_last_parts() {
+    let long = process_file("r10-nothing-300.json");
+    let mut document = long.clone();
+    document.as_object_mut().unwrap().remove("parts");
+    let named = |number: usize| {
+        let mut part = long["parts"][number - 1].clone();
+        part["part"] = json!(format!("p-{number}"));
+        part
+    };
+    let history: Vec<Value> = (1..=260).map(named).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let client = reqwest::Client::new();
+    let process = |service: &Killable, path: &str| service.url(&format!("/v1/processes/shaft-560{path}"));
+    let state = async |service: &Killable| -> Value {
+        client.get(process(service, "/state")).send().await.unwrap().json().await.unwrap()
+    };
+    let service = Killable::start(folder.path());
+    assert_eq!(client.put(process(&service, "")).json(&document).send().await.unwrap().status(), 201);
+    let sent = json!({ "parts": history });
+    assert_eq!(client.post(process(&service, "/parts")).json(&sent).send().await.unwrap().status(), 200);
+    let before = state(&service).await;
+    service.kill();
+    // What the first part was is not looked at again: it says nothing any more but in what was kept.
+    let rows = "json_set(content, '$.measurements[0].diameter_deviation_um', 999.0)";
+    change_on_disk(folder.path(), &[&format!("UPDATE process_entries SET content = {rows} WHERE part = 'p-1'")]).await;
+    let service = Killable::start(folder.path());
+    assert_eq!(state(&service).await, before);
+    let mut next = named(261);
+    next.as_object_mut().unwrap().remove("part");
+    let taken = client.put(process(&service, "/parts/p-261")).json(&next).send().await.unwrap();
+    assert_eq!(taken.status(), 201);
+    let (after, first) = (state(&service).await, &history[0]["measurements"][0]["diameter_deviation_um"]);
+    service.kill();
+    // Where nothing that was kept can be read, all parts are looked at.
+    let rows = format!("json_set(content, '$.measurements[0].diameter_deviation_um', {first})");
+    let restored = format!("UPDATE process_entries SET content = {rows} WHERE part = 'p-1'");
+    change_on_disk(folder.path(), &[&restored, "UPDATE process_snapshots SET content = '{}'"]).await;
+    let service = Killable::start(folder.path());
+    assert_eq!(state(&service).await, after);
     service.kill();
 }
 

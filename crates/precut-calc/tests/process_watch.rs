@@ -46,7 +46,7 @@ fn one_part_far_off_is_odd_and_no_change() {
         let (mut watch, states) = replay(&document, &one_off);
         assert!(states.iter().all(|state| state.state != Situation::Changed && state.changes.is_empty()));
         let odd = &states[46].odd_parts;
-        assert_eq!(odd.iter().map(|odd| (odd.number, odd.reason)).collect::<Vec<_>>(), [(45, "gauge_slip")]);
+        assert_eq!(odd.iter().map(|odd| (odd.number, &*odd.reason)).collect::<Vec<_>>(), [(45, "gauge_slip")]);
         let means =
             [&mut watch, &mut without].map(|watch| watch.outlook(&Unwatched).unwrap().unwrap().forecast.as_now.mean);
         // One part of sixty fewer.

@@ -4,18 +4,20 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use precut_calc::calculator::{Finding, Unwatched};
 use precut_calc::process::{Decision, Outlook, State};
-use serde_json::Value;
+use serde_json::{Value, json};
 use tokio::sync::{Mutex, MutexGuard};
 
 use super::body::{self, Document, Issued, for_calculator};
 use super::{Error, Inner, PAGE, ProcessError, said};
 use crate::registry::{NotReplayed, Watching};
-use crate::store::processes::{Entry, EntryKind, KeptPart, PartNow};
+use crate::store::processes::{Entry, EntryKind, KeptPart, MOST_SNAPSHOTS, PartNow, Snapshot};
 
-/// A process is remembered as it was after every so many parts, the last of these times: from there it is computed again
-/// where a part comes late or is corrected.
-const MARK_EVERY: usize = 64;
-const MARKS: usize = 4;
+/// A process is kept as it was after every so many parts: from there it is computed again when the service starts, or where a part
+/// comes late or is corrected.
+const SNAPSHOT_EVERY: usize = 64;
+
+/// Numbers of all parts.
+pub(super) const ALL: (i64, i64) = (0, i64::MAX);
 
 /// The place of a process in memory. Who holds it adds to the process; others of this program wait.
 #[derive(Default)]
@@ -53,6 +55,14 @@ impl Step {
     fn copy(&self) -> Self {
         Self { watch: self.watch.copy(), ..*self }
     }
+
+    fn snapshot(&self) -> Snapshot {
+        let (watch, first_part) = self.watch.snapshot();
+        let content = json!({
+            "taken": self.taken, "decided": self.decided, "first_part": first_part, "watch": watch,
+        });
+        Snapshot { number: i64::from(self.last), content: content.to_string() }
+    }
 }
 
 /// A part on its way into a process.
@@ -70,7 +80,8 @@ pub(crate) struct Live {
     pub(super) paths: Vec<Issued>,
     decisions: Vec<(u32, String, Decision)>,
     at: Step,
-    marks: Vec<Step>,
+    /// As it was after some of the parts that were computed last.
+    snapshots: Vec<Snapshot>,
     state: Option<State>,
     outlook: Option<Outlook>,
     last_type: Option<String>,
@@ -165,18 +176,19 @@ impl Live {
                 }
             }
             let declared = declared.ok_or_else(gone)?;
-            let document = match &document {
+            let declared_as = match &document {
                 Some(document) => document.clone(),
                 None => Document::read(&inner.registry, &declared)?,
             };
-            let parts = Self::parts(inner, full, 0).await?;
-            let coming = parts
-                .into_iter()
-                .filter_map(|kept| Some((kept.part, u32::try_from(kept.number?).ok()?, kept.content)))
-                .map(|(part, number, content)| coming(part, number, &content, &paths))
-                .collect::<Result<Vec<_>, _>>()?;
-            let mut live = Self::begun(inner, document)?;
+            let mut live = Self::begun(inner, declared_as)?;
             (live.sequence, live.paths, live.decisions) = (head.sequence, paths, decisions);
+            let kept = match &document {
+                Some(_) => None,
+                None => inner.processes.process_snapshot(full.to_owned(), None).await?,
+            };
+            let from = live.resume(inner, full, kept).await?;
+            let parts = Self::parts(inner, full, (i64::from(from), i64::MAX)).await?;
+            let coming = live.coming(parts)?;
             let live = live.ran(coming).await?;
             // Who added meanwhile may be in it or not.
             let now = inner.processes.process(full.to_owned()).await?;
@@ -196,7 +208,7 @@ impl Live {
             paths: Vec::new(),
             decisions: Vec::new(),
             at: Step { watch, last: 0, taken: 0, decided: 0 },
-            marks: Vec::new(),
+            snapshots: Vec::new(),
             state: None,
             outlook: None,
             last_type: None,
@@ -204,11 +216,11 @@ impl Live {
         })
     }
 
-    /// All parts from a number on, in order.
-    pub(super) async fn parts(inner: &Inner, full: &str, from: u32) -> Result<Vec<KeptPart>, Error> {
-        let (mut all, mut next) = (Vec::new(), i64::from(from));
+    /// All parts of those numbers, in order.
+    pub(super) async fn parts(inner: &Inner, full: &str, (from, to): (i64, i64)) -> Result<Vec<KeptPart>, Error> {
+        let (mut all, mut next) = (Vec::new(), from);
         loop {
-            let page = inner.processes.process_parts(full.to_owned(), (next, i64::MAX), PAGE).await?;
+            let page = inner.processes.process_parts(full.to_owned(), (next, to), PAGE).await?;
             let Some(last) = page.last().and_then(|part| part.number) else { return Ok(all) };
             next = last + 1;
             all.extend(page);
@@ -222,7 +234,7 @@ impl Live {
             paths: self.paths.clone(),
             decisions: self.decisions.clone(),
             at: self.at.copy(),
-            marks: self.marks.iter().map(Step::copy).collect(),
+            snapshots: Vec::new(),
             state: self.state.clone(),
             outlook: self.outlook.clone(),
             last_type: self.last_type.clone(),
@@ -230,28 +242,56 @@ impl Live {
         }
     }
 
-    /// The same before a number, as far back as it has to be computed again; the number from which on.
-    pub(super) fn before(&self, inner: &Inner, number: u32) -> Result<(Self, u32), ProcessError> {
-        let kept = self.marks.iter().rposition(|mark| mark.last < number);
-        let at = match kept {
-            Some(place) => self.marks[place].copy(),
-            None => Self::begun(inner, self.document.clone())?.at,
-        };
-        let from = at.last + 1;
-        let marks = self.marks[..kept.map_or(0, |place| place + 1)].iter().map(Step::copy).collect();
-        let back = Self {
-            document: self.document.clone(),
-            sequence: self.sequence,
-            paths: self.paths.clone(),
-            decisions: self.decisions.clone(),
-            at,
-            marks,
-            state: None,
-            outlook: None,
-            last_type: None,
-            said_of: Vec::new(),
-        };
-        Ok((back, from))
+    /// The process before a number, or somewhat earlier, and the parts that are to be taken again from there on.
+    pub(super) async fn back_to(
+        &self,
+        inner: &Inner,
+        full: &str,
+        number: u32,
+    ) -> Result<(Self, Vec<KeptPart>), ProcessError> {
+        if number > self.last() {
+            return Ok((self.copy(), Vec::new()));
+        }
+        let kept = inner.processes.process_snapshot(full.to_owned(), Some(i64::from(number))).await?;
+        let begun = Self::begun(inner, self.document.clone())?;
+        let mut back =
+            Self { sequence: self.sequence, paths: self.paths.clone(), decisions: self.decisions.clone(), ..begun };
+        let from = back.resume(inner, full, kept).await?;
+        let later = Self::parts(inner, full, (i64::from(from), i64::MAX)).await?;
+        Ok((back, later))
+    }
+
+    /// Goes on from a snapshot, where it is one that can be read; the number of the first part that is to be taken.
+    async fn resume(&mut self, inner: &Inner, full: &str, kept: Option<Snapshot>) -> Result<u32, ProcessError> {
+        let Some(kept) = kept else { return Ok(0) };
+        match self.read_snapshot(inner, full, &kept).await {
+            Ok(at) => self.at = at,
+            // A program of another version kept it: everything is on record.
+            Err(error) => tracing::info!(process = full, part = kept.number, ?error, "process_snapshot_not_read"),
+        }
+        Ok(self.at.last + 1)
+    }
+
+    async fn read_snapshot(&self, inner: &Inner, full: &str, kept: &Snapshot) -> Result<Step, ProcessError> {
+        let mut content = read(&kept.content)?;
+        let damaged = || Error::internal("a kept process that cannot be read".to_owned());
+        let count = |field: &str| content[field].as_u64().and_then(|count| usize::try_from(count).ok());
+        let (taken, decided) = (count("taken").ok_or_else(damaged)?, count("decided").ok_or_else(damaged)?);
+        let from = content["first_part"].as_i64().ok_or_else(damaged)?;
+        let parts = Self::parts(inner, full, (from, kept.number)).await?;
+        let parts = self.coming(parts)?.into_iter().map(|coming| coming.value).collect();
+        let (observed, document) = (self.document.observed(&inner.registry)?, self.document.filled.clone());
+        let (resume, watch) = (observed.resume, content["watch"].take());
+        let watch = tokio::task::spawn_blocking(move || resume(document, watch, parts));
+        let watch = watch.await.map_err(|error| Error::internal(error.to_string()))?.map_err(why)?;
+        let last = u32::try_from(kept.number).map_err(|_| damaged())?;
+        Ok(Step { watch, last, taken, decided })
+    }
+
+    /// Parts of the record on their way into the process.
+    pub(super) fn coming(&self, parts: Vec<KeptPart>) -> Result<Vec<Coming>, ProcessError> {
+        let numbered = parts.into_iter().filter_map(|kept| Some((u32::try_from(kept.number?).ok()?, kept)));
+        numbered.map(|(number, kept)| coming(kept.part, number, &kept.content, &self.paths)).collect()
     }
 
     /// Number of the last part, 0 before the first.
@@ -268,6 +308,7 @@ impl Live {
     pub(super) async fn ran(mut self, coming: Vec<Coming>) -> Result<Self, ProcessError> {
         let computed = tokio::task::spawn_blocking(move || {
             self.said_of.clear();
+            self.snapshots.clear();
             self.take(coming)?;
             self.look_ahead()?;
             Ok(self)
@@ -281,10 +322,10 @@ impl Live {
             self.last_type = part.value["part_type"].as_str().map(ToOwned::to_owned);
             let state = self.at.watch.take(part.value, &Unwatched).map_err(why)?;
             (self.at.last, self.at.taken) = (part.number, self.at.taken + 1);
-            if self.at.taken.is_multiple_of(MARK_EVERY) {
-                self.marks.push(self.at.copy());
-                let excess = self.marks.len().saturating_sub(MARKS);
-                self.marks.drain(..excess);
+            if self.at.taken.is_multiple_of(SNAPSHOT_EVERY) {
+                self.snapshots.push(self.at.snapshot());
+                let excess = self.snapshots.len().saturating_sub(MOST_SNAPSHOTS as usize);
+                self.snapshots.drain(..excess);
             }
             self.state = Some(state.clone());
             self.said_of.push((part.part, state));
@@ -345,8 +386,6 @@ impl Live {
         self.state = Some(State { number: self.at.last, ..state });
         self.decisions.push((self.at.last, change.to_owned(), decision.clone()));
         self.at.decided = self.decisions.len();
-        let last = self.at.last;
-        self.marks.retain(|mark| mark.last < last);
         self.look_ahead()?;
         Ok(true)
     }
@@ -382,6 +421,11 @@ impl Live {
     /// What was said after each of the parts that were computed last.
     pub(super) fn said_of(&self) -> &[(String, State)] {
         &self.said_of
+    }
+
+    /// The process after some of the parts that were computed last.
+    pub(super) fn snapshots(&self) -> Vec<Snapshot> {
+        self.snapshots.clone()
     }
 
     /// What is said now of the parts that were computed last.

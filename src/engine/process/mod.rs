@@ -195,10 +195,11 @@ impl Engine {
             inner.model_name_is_free(shelf, name).await?;
         }
         let content = document.content()?;
-        let (mut parts, mut state, mut stored) = (Vec::new(), None, None);
+        let (mut parts, mut snapshots, mut state, mut stored) = (Vec::new(), Vec::new(), None, None);
         if there.is_some() {
             let live = Live::load(inner, &full, Some(document.clone())).await?;
             parts = live.nows().collect();
+            snapshots = live.snapshots();
             stored = live.stored_model(&full, None).await?;
             state = live.state(name, there.map_or(0, |there| there.sequence) + 1);
         }
@@ -226,10 +227,11 @@ impl Engine {
             model: stored,
             entries: vec![entry],
             parts,
-            tells: Vec::new(),
+            snapshots,
             state: state.map(|state| state.to_string()),
             owner: owner.to_owned(),
             quota: inner.settings.quota,
+            ..Addition::default()
         };
         Ok(inner.add(addition).await?.is_some())
     }
@@ -374,14 +376,12 @@ impl Engine {
             let addition = Addition {
                 process: full.clone(),
                 after: Some(live.sequence),
-                document: None,
                 model: stored,
                 entries: vec![entry],
-                parts: Vec::new(),
-                tells: Vec::new(),
                 state: state.map(|state| state.to_string()),
                 owner: owner.clone(),
                 quota: inner.settings.quota,
+                ..Addition::default()
             };
             if inner.add(addition).await?.is_some() {
                 *seated = Some(decided);

@@ -132,14 +132,11 @@ impl Engine {
             let addition = Addition {
                 process: full.clone(),
                 after: Some(live.sequence),
-                document: None,
-                model: None,
                 entries: vec![entry],
-                parts: Vec::new(),
-                tells: Vec::new(),
                 state: live.state(process, live.sequence + 1).map(|state| state.to_string()),
                 owner: owner.to_owned(),
                 quota: inner.settings.quota,
+                ..Addition::default()
             };
             if inner.add(addition).await?.is_some() {
                 return Ok(next);

@@ -5,7 +5,7 @@ use precut_calc::process::State;
 use serde_json::{Value, json};
 
 use super::body::{self, faulty, for_calculator};
-use super::live::{Coming, Live, coming, read};
+use super::live::{ALL, Coming, Live, read};
 use super::{ProcessError, TRIES, canonical_text, said, too_many_parts};
 use crate::engine::{Engine, Error, FilePart, Inner, Shelf};
 use crate::store::processes::{Addition, EntryKind, KeptPart, NewEntry, PartNow};
@@ -162,13 +162,9 @@ impl Engine {
             let live = Live::current(inner, &full, &mut seated).await?;
             let many = inner.many(live, &full, &parts).await?;
             let first = many.iter().map(|part| part.number).min().unwrap_or(0);
-            let (back, from) = if first > live.last() { (live.copy(), 0) } else { live.before(inner, first)? };
-            let later = if from > 0 { Live::parts(inner, &full, from).await? } else { Vec::new() };
-            let (mut all, replayed) = (Vec::new(), later.len());
-            for kept in later {
-                let Some(number) = kept.number.and_then(|number| u32::try_from(number).ok()) else { continue };
-                all.push(coming(kept.part, number, &kept.content, &live.paths)?);
-            }
+            let (back, later) = live.back_to(inner, &full, first).await?;
+            let mut all = live.coming(later)?;
+            let replayed = all.iter().filter(|coming| coming.number > first).count();
             let mut texts: Vec<(String, u32, String)> =
                 many.iter().map(|part| (part.part.clone(), part.number, part.text.clone())).collect();
             texts.sort_by_key(|(_, number, _)| *number);
@@ -241,7 +237,7 @@ impl Inner {
             if let Some(taken) = taken.into_iter().find(|taken| taken.part != part) {
                 return Err(ProcessError::NumberTaken { number, part: taken.part });
             }
-            let parts = Live::parts(self, full, 0).await?;
+            let parts = Live::parts(self, full, ALL).await?;
             let is_before = |kept: &&KeptPart| kept.number.is_some_and(|own| own < at) && kept.part != part;
             let is_after = |kept: &&KeptPart| kept.number.is_some_and(|own| own > at) && kept.part != part;
             beside.extend(parts.iter().rev().find(is_before).cloned());
@@ -304,7 +300,7 @@ impl Inner {
         if !found.is_empty() {
             return Err(faulty(found));
         }
-        let there = Live::parts(self, full, 0).await?;
+        let there = Live::parts(self, full, ALL).await?;
         for own in &many {
             if let Some(kept) = there.iter().find(|kept| kept.part == own.part) {
                 if kept.content != own.text {
@@ -343,14 +339,9 @@ impl Inner {
                 return Err(faulty(doubts));
             }
         }
-        let (back, from) = if first > live.last() { (live.copy(), 0) } else { live.before(self, first)? };
-        let later = if from > 0 { Live::parts(self, full, from).await? } else { Vec::new() };
-        let (mut all, mut replayed) = (Vec::new(), 0);
-        for kept in later.into_iter().filter(|kept| kept.part != part) {
-            let Some(own) = kept.number.and_then(|number| u32::try_from(number).ok()) else { continue };
-            replayed += usize::from(own > first);
-            all.push(coming(kept.part, own, &kept.content, &live.paths)?);
-        }
+        let (back, later) = live.back_to(self, full, first).await?;
+        let mut all = live.coming(later.into_iter().filter(|kept| kept.part != part).collect())?;
+        let replayed = all.iter().filter(|coming| coming.number > first).count();
         all.extend(comes);
         all.sort_by_key(|part| part.number);
         let mut next = back.ran(all).await?;
@@ -384,14 +375,15 @@ impl Inner {
         let addition = Addition {
             process: full.to_owned(),
             after: Some(live.sequence),
-            document: None,
             model: stored,
             entries: vec![entry],
             parts,
+            snapshots: next.snapshots(),
             tells,
             state: state.map(|state| state.to_string()),
             owner: owner.to_owned(),
             quota: self.settings.quota,
+            ..Addition::default()
         };
         let added = self.add(addition).await?;
         Ok(added.map(|_| (next, PartAnswer { outcome, revision, said })))
@@ -446,15 +438,13 @@ impl Live {
         Addition {
             process: full.to_owned(),
             after: Some(after),
-            document: None,
-            model: None,
             entries,
             parts,
-            // A history that comes at once happened long ago.
-            tells: Vec::new(),
+            snapshots: self.snapshots(),
             state,
             owner: owner.to_owned(),
-            quota: crate::store::jobs::Quota::default(),
+            // A history that comes at once happened long ago: nobody is told.
+            ..Addition::default()
         }
     }
 }

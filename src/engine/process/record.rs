@@ -121,15 +121,15 @@ impl Engine {
         };
         let addition = Addition {
             process: full,
-            after: None,
             document: Some(kept),
             model: stored,
             entries,
             parts: parts.collect(),
-            tells: Vec::new(),
+            snapshots: live.snapshots(),
             state: live.state(name, live.sequence).map(|state| state.to_string()),
             owner,
             quota: inner.settings.quota,
+            ..Addition::default()
         };
         if inner.add(addition).await?.is_none() {
             return Err(ProcessError::Exists(name.to_owned()));

@@ -9,7 +9,9 @@ use super::documents::{delete as delete_document, put};
 use super::usage::usage_of;
 use crate::store::StoreError;
 use crate::store::documents::{Kind, NewDocument, NewDocuments, PutDocuments};
-use crate::store::processes::{Added, Addition, Entry, EntryKind, Head, KeptPart, NewEntry, PartNow, ProcessStore};
+use crate::store::processes::{
+    Added, Addition, Entry, EntryKind, Head, KeptPart, MOST_SNAPSHOTS, NewEntry, PartNow, ProcessStore, Snapshot,
+};
 use crate::store::quota::Quota;
 use crate::store::sql::{Lock, Outcome, Session, Writes, sql};
 
@@ -105,6 +107,27 @@ impl<W: Writes> ProcessStore for W {
         })
     }
 
+    fn process_snapshot(
+        &self,
+        name: String,
+        before: Option<i64>,
+    ) -> BoxFuture<'_, Result<Option<Snapshot>, StoreError>> {
+        Box::pin(async move {
+            // It says nothing of parts that came late, or were corrected or withdrawn since, nor of another document.
+            let snapshot = sql("SELECT number, content FROM process_snapshots AS own
+                 WHERE process = $1
+                   AND number < coalesce($2, (SELECT max(number) FROM process_parts WHERE process = $1))
+                   AND NOT EXISTS (
+                     SELECT 1 FROM process_entries AS later
+                     WHERE later.process = $1 AND later.sequence > own.sequence AND later.kind = 'document')
+                   AND NOT EXISTS (
+                     SELECT 1 FROM process_entries AS later JOIN process_entries AS of_part USING (process, part)
+                     WHERE process = $1 AND later.sequence > own.sequence AND of_part.number <= own.number)
+                 ORDER BY number DESC LIMIT 1");
+            Ok(self.reader().await?.first(snapshot.bind(name).bind(before)).await?)
+        })
+    }
+
     fn add_to_process(&self, addition: Addition) -> BoxFuture<'_, Result<Added, StoreError>> {
         let addition = Arc::new(addition);
         self.write(move |connection| {
@@ -162,9 +185,27 @@ async fn add<S: Session>(connection: &mut S, new: &Addition) -> Outcome<Added> {
         note_entry(connection, (&new.process, sequence_of(*place)), callback, now).await?;
     }
     let sequence = sequence_of(new.entries.len()) - 1;
+    keep_snapshots(connection, new, sequence).await?;
     let head = sql("UPDATE processes SET sequence = $2, state = $3 WHERE name = $1");
     connection.run(head.bind(&new.process).bind(sequence).bind(&new.state)).await?;
     Ok(Added::Done { sequence, created_ms: now })
+}
+
+/// Keeps a process as it is after some of its parts.
+async fn keep_snapshots<S: Session>(connection: &mut S, new: &Addition, sequence: i64) -> Outcome<()> {
+    for snapshot in &new.snapshots {
+        let kept = sql("INSERT INTO process_snapshots (process, number, sequence, content) VALUES ($1, $2, $3, $4)
+             ON CONFLICT (process, number) DO UPDATE SET sequence = $3, content = $4");
+        let kept = kept.bind(&new.process).bind(snapshot.number).bind(sequence).bind(&snapshot.content);
+        connection.run(kept).await?;
+    }
+    if !new.snapshots.is_empty() {
+        let old = sql("DELETE FROM process_snapshots WHERE process = $1 AND (sequence, number) <= (
+                 SELECT sequence, number FROM process_snapshots WHERE process = $1
+                 ORDER BY sequence DESC, number DESC LIMIT 1 OFFSET $2)");
+        connection.run(old.bind(&new.process).bind(MOST_SNAPSHOTS)).await?;
+    }
+    Ok(())
 }
 
 /// Keeps a document of a process, for which there is room; its revision.
@@ -224,6 +265,7 @@ async fn delete<S: Session>(connection: &mut S, name: &str, at: i64) -> Outcome<
     for of_it in [
         "DELETE FROM process_entries WHERE process = $1",
         "DELETE FROM process_parts WHERE process = $1",
+        "DELETE FROM process_snapshots WHERE process = $1",
         "DELETE FROM callbacks WHERE process = $1",
     ] {
         connection.run(sql(of_it).bind(name)).await?;

@@ -167,6 +167,7 @@ macro_rules! suite {
             a_record_grows_without_a_gap_whoever_is_first
             parts_are_corrected_and_withdrawn_with_their_history
             a_process_counts_for_its_owner_until_it_is_deleted
+            a_snapshot_counts_until_something_before_it_changes
         }
         suite! { $place, results:
             what_is_put_is_got_after_the_store_was_closed

@@ -4,7 +4,7 @@ use super::Place;
 use crate::store::callbacks::{CallbackState, NewCallback, Subject, TakeUp, Tried};
 use crate::store::documents::{Kind, NewDocument};
 use crate::store::jobs::Quota;
-use crate::store::processes::{Added, Addition, EntryKind, NewEntry, PartNow};
+use crate::store::processes::{Added, Addition, EntryKind, NewEntry, PartNow, Snapshot};
 use crate::store::{Store, StoreError};
 
 const NAME: &str = "one/shaft";
@@ -43,14 +43,11 @@ fn addition(after: Option<i64>, entries: Vec<NewEntry>) -> Addition {
     Addition {
         process: NAME.to_owned(),
         after,
-        document: None,
-        model: None,
         parts: parts.collect(),
         entries,
-        tells: Vec::new(),
         state: Some("{}".to_owned()),
         owner: "key:one".to_owned(),
-        quota: Quota::default(),
+        ..Addition::default()
     }
 }
 
@@ -167,4 +164,51 @@ pub(in crate::store) async fn a_process_counts_for_its_owner_until_it_is_deleted
     assert_eq!(add(store, declared(None, "{}")).await, Some(1));
     let again = store.process_entries(NAME.to_owned(), 0, 10, false).await.unwrap();
     assert_eq!(again[0].revision, 2, "numbers of what was deleted are not given again");
+}
+
+pub(in crate::store) async fn a_snapshot_counts_until_something_before_it_changes<P: Place>() {
+    let place = P::new().await;
+    let store = place.store();
+    add(store, declared(None, "{}")).await;
+    let snapshot = |number: i64| Snapshot { number, content: format!("{{\"after\":{number}}}") };
+    for number in 1..=12_u32 {
+        let snapshots = if number % 2 == 0 { vec![snapshot(i64::from(number))] } else { Vec::new() };
+        let own = part(i64::from(number), &format!("p{number}"), number);
+        add(store, Addition { snapshots, ..own }).await;
+    }
+    let last = async |before: Option<i64>| {
+        let kept = store.process_snapshot(NAME.to_owned(), before).await.unwrap();
+        kept.map(|kept| (kept.number, kept.content))
+    };
+    let told = |number: i64| Some((number, snapshot(number).content));
+    assert_eq!(last(None).await, told(10), "of the last part itself nothing would be said");
+    assert_eq!(last(Some(10)).await, told(8));
+    assert_eq!(last(Some(6)).await, None, "four are kept");
+    // A part that is corrected: what was kept after it counts no more, until it is kept again.
+    let corrected = NewEntry { revision: 2, ..entry(EntryKind::Part, "p9", Some(9), "[2]") };
+    add(store, addition(Some(13), vec![corrected])).await;
+    assert_eq!(last(None).await, told(8));
+    let snapshots = vec![Snapshot { content: "{}".to_owned(), ..snapshot(10) }];
+    let other = NewEntry { revision: 3, ..entry(EntryKind::Part, "p9", Some(9), "[3]") };
+    add(store, Addition { snapshots, ..addition(Some(14), vec![other]) }).await;
+    assert_eq!(last(None).await, Some((10, "{}".to_owned())));
+    // One that is withdrawn, one that gets another number, and one that comes late.
+    let withdrawn = NewEntry { revision: 4, ..entry(EntryKind::Withdrawn, "p9", None, "null") };
+    add(store, addition(Some(15), vec![withdrawn])).await;
+    assert_eq!(last(None).await, told(8));
+    let moved = NewEntry { revision: 2, ..entry(EntryKind::Part, "p8", Some(20), "[]") };
+    add(store, addition(Some(16), vec![moved])).await;
+    assert_eq!(last(None).await, told(6));
+    add(store, Addition { snapshots: vec![snapshot(12)], ..part(17, "p30", 30) }).await;
+    assert_eq!(last(None).await, told(12));
+    add(store, part(18, "late", 9)).await;
+    assert_eq!(last(None).await, told(6));
+    // Another document judges all parts anew.
+    add(store, Addition { snapshots: vec![snapshot(12)], ..part(19, "p31", 31) }).await;
+    add(store, declared(Some(20), "[1]")).await;
+    assert_eq!(last(None).await, None);
+    assert!(store.delete_process(NAME.to_owned(), 21).await.unwrap());
+    add(store, declared(None, "{}")).await;
+    add(store, part(1, "a", 40)).await;
+    assert_eq!(last(None).await, None);
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::memory::Memory;
 use super::null::Null;
@@ -90,9 +90,9 @@ enum Tier {
 }
 
 /// A part whose account is still open.
-struct Cut<M: Watched> {
-    part: PartOf<M>,
-    sighting: Sighting,
+pub(super) struct Cut<M: Watched> {
+    pub(super) part: PartOf<M>,
+    pub(super) sighting: Sighting,
 }
 
 /// Path that the base job gives, and the run that decided it.
@@ -100,22 +100,23 @@ type Decided<M> = (<M as ForwardModel>::Run, Option<<M as ForwardModel>::Run>);
 
 /// The account: parts in memory are open, as what is known of their model still changes; older ones are closed.
 pub(super) struct Account<M: Watched> {
-    open: VecDeque<Cut<M>>,
+    pub(super) open: VecDeque<Cut<M>>,
     /// Look at parts as if they were cut on the nominal path, and on that of the base job.
     eyes: [Eye<M>; 2],
     /// Of each type the last one.
     decided: Vec<Option<Decided<M>>>,
-    closed: Totals,
+    pub(super) closed: Totals,
     /// Standard normal numbers, a draw each row.
     normals: DMatrix<f64>,
 }
 
 /// Sums over parts.
-#[derive(Clone)]
-struct Totals {
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Totals {
     parts: usize,
     on_other: usize,
     /// Forms of those on another path: without compensation, on the base job's path, and as cut.
+    #[serde(with = "super::snapshot::bits")]
     forms: [f64; 3],
     /// How many had a path of the base job.
     with_base: usize,

@@ -1,10 +1,12 @@
 //! Path that an edge had cut when a part began, where the parts say which edge it was and no more (`process/3.1`).
 
+use serde::{Deserialize, Serialize};
+
 use super::watch::{DocumentOf, PartOf};
 use crate::calculator::Watched;
 
 /// The edge in use: which, after which part, and the path that it has cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Edge {
     which: u32,
     number: u32,

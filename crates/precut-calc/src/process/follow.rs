@@ -1,5 +1,7 @@
 //! A change from its alarm until it is part of the mean profile (`process/3.5`).
 
+use serde::{Deserialize, Serialize};
+
 use super::detector::statistic;
 use super::memory::Memory;
 use super::null::{Column, Null, Older, Source, Told};
@@ -16,7 +18,7 @@ const MOST_CAUSES: usize = 4;
 const MOST_TOLD: usize = 50;
 
 /// A change that was reported and is not yet part of the model.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Pending {
     pub(super) id: String,
     pub(super) reported: u32,
@@ -24,7 +26,7 @@ pub(super) struct Pending {
 }
 
 /// A change that is part of the model.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Accepted {
     pub(super) id: String,
     pub(super) since: u32,
@@ -91,7 +93,8 @@ impl Memory {
             part.odd |= part.number == number;
         }
         self.scores.retain(|(own, ..)| *own != number);
-        self.odd.push(OddPart { number, reason: reason.flatten().unwrap_or("blank_or_clamping") });
+        let reason = reason.flatten().unwrap_or("blank_or_clamping").into();
+        self.odd.push(OddPart { number, reason });
         let excess = self.odd.len().saturating_sub(MOST_TOLD);
         self.odd.drain(..excess);
     }

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::document::{Options, Threshold};
@@ -37,7 +38,7 @@ const LEARN_AFTER: [usize; 3] = [40, 80, 160];
 const MOST_CHANGES: usize = 6;
 
 /// All that is remembered of the parts.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Memory {
     pub(super) options: Options,
     pub(super) noise: Option<f64>,
@@ -46,6 +47,7 @@ pub(super) struct Memory {
     pub(super) columns: Vec<Column>,
     pub(super) older: Older,
     /// The last parts, by ascending number, with what they tell once the scatter is known.
+    #[serde(skip)]
     pub(super) parts: VecDeque<(Sighting, Option<Gram>)>,
     /// Parts that came, and parts that were used.
     pub(super) came: usize,
@@ -62,8 +64,8 @@ pub(super) struct Memory {
     pub(super) odd: Vec<OddPart>,
     /// Number, distance and rows of the last parts.
     pub(super) scores: VecDeque<(u32, f64, usize)>,
-    /// log10 of the statistic beside its threshold, after the part before.
-    pub(super) evidence: f64,
+    /// log10 of the statistic beside its threshold, after the part before; none where nothing speaks of a change.
+    pub(super) evidence: Option<f64>,
 }
 
 impl Memory {
@@ -88,7 +90,7 @@ impl Memory {
             changes: Vec::new(),
             odd: Vec::new(),
             scores: VecDeque::new(),
-            evidence: f64::NEG_INFINITY,
+            evidence: None,
         }
     }
 
@@ -116,7 +118,7 @@ impl Memory {
         self.keep_pace(number, score);
         self.learn_again();
         let (situation, evidence) = self.follow(number);
-        self.evidence = evidence;
+        self.evidence = Some(evidence).filter(|evidence| evidence.is_finite());
         let rare = score.is_some_and(|score| score.p < RARE) || self.has_scatter_grown();
         let warns = situation == Situation::InControl && (rare || evidence >= WARNING.log10());
         let situation = if warns { Situation::Warning } else { situation };
@@ -192,7 +194,7 @@ impl Memory {
         }
     }
 
-    fn look_again(&mut self) {
+    pub(super) fn look_again(&mut self) {
         let Some(scatter) = &self.scatter else { return };
         for (part, gram) in &mut self.parts {
             *gram = Some(Gram::of(part, scatter, &self.catalogue));
@@ -320,7 +322,7 @@ impl Memory {
     /// Once more while nothing stirs: what changes would pass for scatter.
     pub(super) fn learn_again(&mut self) {
         let due = LEARN_AFTER.iter().any(|&after| after <= self.used && after > self.learned_at);
-        if due && self.pending.is_none() && self.evidence < STIRS {
+        if due && self.pending.is_none() && self.evidence.is_none_or(|evidence| evidence < STIRS) {
             self.learn();
         }
     }

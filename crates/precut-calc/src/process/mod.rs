@@ -14,6 +14,7 @@
 //! - `outlook`, `action`, `measure`, `next`: the next part (`process/4`, `process/5`); `stored`: the model for later jobs;
 //! - `account`: what paths brought (`process/6`);
 //! - `memory`, `follow`, `decide`: what is remembered of the parts, of a change from its alarm on, and what a person says of it;
+//! - `snapshot`: what a process is kept as, so that it goes on from its last parts;
 //! - `watch`: all of it, part by part; `state`, `report`: what is said after each.
 //!
 //! The state is a function of the document and of the parts in the order of their numbers, and of nothing else. It holds no
@@ -36,6 +37,7 @@ mod outlook;
 mod report;
 mod scatter;
 mod sight;
+mod snapshot;
 mod state;
 mod stored;
 mod sums;
@@ -50,6 +52,7 @@ pub use document::{Document, GaugeCheck, MOST_PARTS, Options, Part, PartType, Th
 pub use next::Next;
 pub use report::EXPLANATION_CODES;
 pub use sight::GAUGE_SIZE;
+pub use snapshot::Snapshot;
 pub use state::*;
 pub use stored::StoredModel;
 pub use watch::{DocumentOf, PartOf, Watch};

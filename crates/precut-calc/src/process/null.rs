@@ -1,6 +1,7 @@
 //! What is free although nothing changed, and what the parts tell of it (`process/3.1`).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use serde::{Deserialize, Serialize};
 
 use super::scatter::Scatter;
 use super::sight::{COSINES, Catalogue, Sighting};
@@ -12,7 +13,7 @@ const PROFILE_UM: f64 = 10.0;
 pub(super) const DRIFT_PARTS: f64 = 20.0;
 
 /// A column that is free in every part, with a standard normal size.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Column {
     pub(super) source: Source,
     /// From which part on it acts, and whether it grows from there.
@@ -22,7 +23,7 @@ pub(super) struct Column {
 }
 
 /// What a column is of.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) enum Source {
     /// A cosine of the mean profile of one type of parts.
     Profile { kind: usize, order: usize },
@@ -33,7 +34,7 @@ pub(super) enum Source {
 }
 
 /// How something changed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Form {
     Step,
     Drift,
@@ -162,7 +163,8 @@ impl<'a> Told<'a> {
 }
 
 /// What parts that left the memory still tell: A and eta without the prior.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(try_from = "super::snapshot::Sums", into = "super::snapshot::Sums")]
 pub(super) struct Older {
     pub(super) a: DMatrix<f64>,
     pub(super) eta: DVector<f64>,

@@ -46,15 +46,15 @@ fn cause(suspect: &Suspect, catalogue: &Catalogue) -> ChangedCause {
     let (parameter, unit, prior_sd, [lower, upper]) = match suspect.what {
         What::Cause(variant) => {
             let own = &catalogue.variants[variant];
-            (own.parameter, own.unit, own.prior_sd, own.range)
+            (own.parameter.clone(), own.unit.clone(), own.prior_sd, own.range)
         }
-        What::Unnamed(_) => ("rms", "um", 1.0, [f64::NEG_INFINITY, f64::INFINITY]),
+        What::Unnamed(_) => ("rms".into(), "um".into(), 1.0, [f64::NEG_INFINITY, f64::INFINITY]),
     };
     let at = |deviations: f64| (suspect.mean + deviations * suspect.deviation) * prior_sd;
     // A root mean square is no less than nothing.
     let least = if suspect.name.is_none() { 0.0 } else { f64::NEG_INFINITY };
     ChangedCause {
-        kind: name.map_or("unnamed", |name| name.kind).to_owned(),
+        kind: name.map_or("unnamed", |name| &*name.kind).to_owned(),
         label: name.map_or_else(String::new, |name| name.label.clone()),
         share: suspect.share,
         form: form_of(suspect.form),
@@ -74,13 +74,13 @@ pub(super) fn model_size(catalogue: &Catalogue, column: &Column, mean: f64, devi
     let name = &catalogue.names[own.name];
     let at = |deviations: f64| (mean + deviations * deviation) * column.sd * own.prior_sd;
     Some(ModelSize {
-        kind: name.kind.to_owned(),
+        kind: name.kind.clone().into_owned(),
         label: name.label.clone(),
         since_part: column.since.map(|(since, _)| since),
         form: column.since.map(|(_, form)| form_of(form)),
         shape: own.shape.clone(),
-        parameter: own.parameter,
-        unit: own.unit,
+        parameter: own.parameter.clone(),
+        unit: own.unit.clone(),
         delta: at(0.0),
         interval_95: [at(-NORMAL_95), at(NORMAL_95)],
     })
@@ -121,7 +121,11 @@ pub(super) fn explanation(state: &State, options: &Options) -> Vec<Message> {
         Situation::Changed => {}
     }
     for odd in state.odd_parts.iter().rev().take(1) {
-        said.push(Message::new("process_odd_part").with("part", f64::from(odd.number)).with("reason", odd.reason));
+        said.push(
+            Message::new("process_odd_part")
+                .with("part", f64::from(odd.number))
+                .with("reason", odd.reason.clone().into_owned()),
+        );
     }
     said
 }

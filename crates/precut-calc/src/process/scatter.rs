@@ -1,6 +1,7 @@
 //! How far single readings and whole parts scatter, learned from the parts (`process/3.4`).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use super::null::Null;
 use super::sight::Sighting;
@@ -18,7 +19,7 @@ const STEPS: usize = 16;
 const REACH: f64 = 3.0;
 
 /// Scatter of readings and of parts.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Scatter {
     /// Standard deviation of a reading, in the unit of the quantity.
     pub(super) sigma: f64,

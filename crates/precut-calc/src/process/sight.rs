@@ -1,6 +1,9 @@
 //! What a part shows: how far it lies from the model, and what every cause would do to it (`process/3.1`).
 
+use std::borrow::Cow;
 use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
 
 use super::document::{Document, GaugeCheck, Part};
 use super::state::ModelShape;
@@ -22,22 +25,23 @@ pub const GAUGE_SIZE: (&str, &str, &str) = (GAUGE, "offset_um", "um");
 const GAUGE_UM: f64 = 8.0;
 
 /// A cause that may change, by its name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Name {
-    pub(super) kind: &'static str,
+    pub(super) kind: Cow<'static, str>,
     /// Which of several of one kind.
     pub(super) label: String,
 }
 
 /// One size of a cause at one point of the grid of its shapes: one column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Variant {
     pub(super) name: usize,
     /// The size: its field, unit and prior standard deviation.
-    pub(super) parameter: &'static str,
-    pub(super) unit: &'static str,
+    pub(super) parameter: Cow<'static, str>,
+    pub(super) unit: Cow<'static, str>,
     pub(super) prior_sd: f64,
     /// Least and largest value of the change.
+    #[serde(with = "super::snapshot::bits")]
     pub(super) range: [f64; 2],
     /// Which of the variables of the hypothesis, and what the others are; none of the gauge.
     pub(super) setting: Option<(usize, Vec<f64>)>,
@@ -59,7 +63,7 @@ impl Variant {
 }
 
 /// All causes that the parts so far can speak of.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Catalogue {
     pub(super) names: Vec<Name>,
     pub(super) variants: Vec<Variant>,
@@ -69,7 +73,7 @@ impl Catalogue {
     fn name(&mut self, kind: &'static str, label: &str) -> usize {
         let is_it = |name: &Name| name.kind == kind && name.label == label;
         self.names.iter().position(is_it).unwrap_or_else(|| {
-            self.names.push(Name { kind, label: label.to_owned() });
+            self.names.push(Name { kind: kind.into(), label: label.to_owned() });
             self.names.len() - 1
         })
     }
@@ -85,7 +89,7 @@ impl Catalogue {
     /// Share of every variant of all that may change. Names have equal shares, which their variants divide; a level that
     /// moved is one name, be it that of the part or of the gauge.
     pub(super) fn shares(&self) -> Vec<f64> {
-        let weight = |name: usize| if [LEVEL, GAUGE].contains(&self.names[name].kind) { 0.5 } else { 1.0 };
+        let weight = |name: usize| if [LEVEL, GAUGE].contains(&&*self.names[name].kind) { 0.5 } else { 1.0 };
         let total: f64 = (0..self.names.len()).map(weight).sum();
         let count = |name: usize| self.variants.iter().filter(|variant| variant.name == name).count() as f64;
         self.variants.iter().map(|own| weight(own.name) / total / count(own.name)).collect()
@@ -258,8 +262,8 @@ impl<M: Watched> Eye<M> {
         let name = catalogue.name(GAUGE, "");
         let gauge = catalogue.variant(Variant {
             name,
-            parameter: GAUGE_SIZE.1,
-            unit: GAUGE_SIZE.2,
+            parameter: GAUGE_SIZE.1.into(),
+            unit: GAUGE_SIZE.2.into(),
             prior_sd: GAUGE_UM,
             range: [f64::NEG_INFINITY, f64::INFINITY],
             setting: None,
@@ -286,11 +290,11 @@ fn of_size(catalogue: &mut Catalogue, hypothesis: &Hypothesis, variable: usize, 
     };
     let shape =
         hypothesis.variables.iter().zip(values).filter(|(of, _)| matches!(of.treatment, Treatment::Shape { .. }));
-    let shape = shape.map(|(of, &value)| ModelShape { parameter: of.name, unit: of.unit, value });
+    let shape = shape.map(|(of, &value)| ModelShape { parameter: of.name.into(), unit: of.unit.into(), value });
     Variant {
         name: catalogue.name(hypothesis.cause.kind, &hypothesis.label),
-        parameter: own.name,
-        unit: own.unit,
+        parameter: own.name.into(),
+        unit: own.unit.into(),
         prior_sd,
         range: [own.range.lower, own.range.upper],
         setting: Some((variable, values.to_vec())),
@@ -334,6 +338,7 @@ impl Signs {
             keep: self.predicted.clone(),
             signs: self,
             checks: Vec::new(),
+            path_m: None,
             odd: false,
         }
     }
@@ -353,6 +358,8 @@ pub(super) struct Sighting {
     /// Rows that count.
     pub(super) keep: Vec<bool>,
     pub(super) checks: Vec<GaugeCheck>,
+    /// Path that its edge had cut when it began, m, where that is known.
+    pub(super) path_m: Option<f64>,
     /// Whether it is odd by itself and counts no more.
     pub(super) odd: bool,
 }

@@ -1,6 +1,8 @@
 //! What is said after a part (`process/4`).
 
-use serde::Serialize;
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
 
 use super::account::Gain;
 use crate::calculator::Message;
@@ -95,7 +97,7 @@ pub struct ScatterReport {
 }
 
 /// How sure a change has a name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChangeVerdict {
     /// One cause.
@@ -107,7 +109,7 @@ pub enum ChangeVerdict {
 }
 
 /// How a change goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ChangeForm {
     /// It stays as it is.
@@ -117,7 +119,7 @@ pub enum ChangeForm {
 }
 
 /// What a person says of a change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decided {
     /// It is one.
@@ -129,7 +131,7 @@ pub enum Decided {
 }
 
 /// A change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// `c1`, `c2`, in the order in which they were reported.
     pub id: String,
@@ -151,21 +153,21 @@ pub struct Change {
 }
 
 /// A cause that may have changed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChangedCause {
     /// Its kind in the catalogue; `gauge_offset` of the gauge, `unnamed` of what has none.
     pub kind: String,
     /// Which of several of one kind.
-    #[serde(skip_serializing_if = "String::is_empty")]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub label: String,
     /// Probability.
     pub share: f64,
     /// How it goes on.
     pub form: ChangeForm,
     /// The field of the effect that changed; of what has no name its root mean square along the part.
-    pub parameter: &'static str,
+    pub parameter: Cow<'static, str>,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// By how much.
     pub delta: f64,
     /// The same with 95 %.
@@ -177,12 +179,12 @@ pub struct ChangedCause {
 }
 
 /// A part that is odd by itself.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OddPart {
     /// Its number.
     pub number: u32,
     /// `gauge_slip` where all of it is off alike, otherwise `blank_or_clamping`.
-    pub reason: &'static str,
+    pub reason: Cow<'static, str>,
 }
 
 /// What the next part will be like, and what to do.
@@ -216,12 +218,12 @@ pub struct Model {
 }
 
 /// A field of an effect that gives its form.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelShape {
     /// The field.
-    pub parameter: &'static str,
+    pub parameter: Cow<'static, str>,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Its value.
     pub value: f64,
 }
@@ -244,9 +246,9 @@ pub struct ModelSize {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shape: Vec<ModelShape>,
     /// The field of the effect.
-    pub parameter: &'static str,
+    pub parameter: Cow<'static, str>,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// By how much it differs from the base job's.
     pub delta: f64,
     /// The same with 95 %.

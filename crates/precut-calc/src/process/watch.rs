@@ -22,7 +22,7 @@ pub struct Watch<M: Watched> {
     pub(super) memory: Memory,
     pub(super) last: Option<PartOf<M>>,
     pub(super) account: Account<M>,
-    edge: Option<Edge>,
+    pub(super) edge: Option<Edge>,
 }
 
 impl<M: Watched> Watch<M> {
@@ -88,13 +88,19 @@ impl<M: Watched> Watch<M> {
         Ok(finding.into_iter().collect())
     }
 
-    fn seen(&mut self, part: &PartOf<M>, ordinal: usize, monitor: &dyn Monitor) -> Result<Sighting, Failure> {
+    pub(super) fn seen(
+        &mut self,
+        part: &PartOf<M>,
+        ordinal: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<Sighting, Failure> {
         let signs = self.eye.signs(part, &mut self.memory.catalogue, monitor)?;
         let (kind, value) = (self.eye.kind(part)?, self.eye.values(part));
         let residual = value.iter().zip(&signs.base).zip(&signs.predicted);
         let residual = residual.map(|((y, f), predicted)| if *predicted { y - f } else { 0.0 }).collect();
         let (keep, checks, number) = (signs.predicted.clone(), part.gauge_checks.clone(), part.number);
-        Ok(Sighting { number, ordinal, kind, signs, value, residual, keep, checks, odd: false })
+        let path_m = M::path_m(&part.conditions);
+        Ok(Sighting { number, ordinal, kind, signs, value, residual, keep, checks, path_m, odd: false })
     }
 
     /// The same once more: what comes to one of them does not come to the other.
