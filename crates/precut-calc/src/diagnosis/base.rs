@@ -15,8 +15,6 @@ use crate::calculator::{
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
 const DEAR_MS: f64 = 5.0;
-/// Up to this time a simulation is short: then all single causes are looked for in all their places.
-const SHORT_MS: f64 = 20.0;
 
 /// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
 ///
@@ -35,7 +33,6 @@ pub struct Bound<'a, M: Diagnosable> {
     hypotheses: Hypotheses,
     logarithmic: bool,
     dear: bool,
-    short: bool,
     /// The base with the numerics of divided differences.
     coarse_base: OnceLock<Vec<Prediction>>,
     monitor: &'a dyn Monitor,
@@ -63,9 +60,9 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         }
         weigh(&mut hypotheses.applicable, &options.prior_weights);
         let ms = M::predict_cost(&prepared).ms;
-        let (dear, short) = (ms > DEAR_MS, ms <= SHORT_MS);
+        let dear = ms > DEAR_MS;
         let coarse_base = OnceLock::new();
-        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, short, coarse_base, monitor })
+        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, monitor })
     }
 
     /// The forward model's own view of the rows.
@@ -80,7 +77,7 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
 
     /// The whole search over its rows.
     pub(super) fn effort(&self, most_causes: usize) -> Effort {
-        Effort::of(most_causes, self.dear, self.short)
+        Effort::of(most_causes, self.dear)
     }
 
     /// What these rows can and cannot speak about.
