@@ -33,8 +33,9 @@ pub struct Bound<'a, M: Diagnosable> {
     hypotheses: Hypotheses,
     logarithmic: bool,
     dear: bool,
-    /// The base with the numerics of divided differences.
+    /// The base with the numerics of divided differences, and of a search.
     coarse_base: OnceLock<Vec<Prediction>>,
+    rough_base: OnceLock<Vec<Prediction>>,
     monitor: &'a dyn Monitor,
 }
 
@@ -61,8 +62,8 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         weigh(&mut hypotheses.applicable, &options.prior_weights);
         let ms = M::predict_cost(&prepared).ms;
         let dear = ms > DEAR_MS;
-        let coarse_base = OnceLock::new();
-        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, monitor })
+        let (coarse_base, rough_base) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, rough_base, monitor })
     }
 
     /// The forward model's own view of the rows.
@@ -312,6 +313,20 @@ where
 
     fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
         self.centre(settings)
+    }
+
+    fn predict_roughly(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        let at = |settings: &[Setting]| {
+            Ok(self.in_unit(M::predict_roughly(&self.prepared, &self.with_settings(settings)?, self.monitor)?))
+        };
+        match self.rough_base.get() {
+            _ if !settings.is_empty() => at(settings),
+            Some(base) => Ok(base.clone()),
+            None => {
+                let base = at(&[])?;
+                Ok(self.rough_base.get_or_init(|| base).clone())
+            }
+        }
     }
 
     /// Sizes that the model is linearised about. Those of a change of a held effect are counted from what the base holds.

@@ -26,6 +26,8 @@ use super::turning::{Stuck, turn};
 const NODES: usize = 7200;
 /// Nodes of the predictions that divided differences are made of.
 const COARSE_NODES: usize = 1440;
+/// Nodes of the predictions that say where a wave comes near to the rows: twenty to a wave of a roller of a twelfth of the ring.
+const ROUGH_NODES: usize = 240;
 
 /// How wrong the base may be without that being a finding: standard deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -316,6 +318,14 @@ impl Diagnosable for RingRoundness {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Prediction>, Failure> {
         prepared.predicted(effects, COARSE_NODES, monitor)
+    }
+
+    fn predict_roughly(
+        prepared: &PreparedRing,
+        effects: &[RingEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        prepared.predicted(effects, ROUGH_NODES, monitor)
     }
 
     fn predict_ms(job: &Job) -> f64 {
