@@ -23,8 +23,8 @@ impl Refinement<'_> {
     ///
     /// A model with kinks, as teeth are that move, may foretell a cost at the end of a step that it keeps at no share of it. What
     /// it does not keep is no evidence: the cost that was reached counts.
-    pub(super) fn descend(&self, start: Start, unknowns: Unknowns) -> Result<Option<Fit>, Failure> {
-        let Some(mut stand) = self.first(&start, &unknowns)? else { return Ok(None) };
+    pub(super) fn descend(&self, start: &Start, unknowns: Unknowns) -> Result<Option<Fit>, Failure> {
+        let Some(mut stand) = self.first(start, &unknowns)? else { return Ok(None) };
         let mut is_worth_it = true;
         for step in 0.. {
             checkpoint(self.monitor)?;

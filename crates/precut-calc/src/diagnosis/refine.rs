@@ -172,7 +172,7 @@ impl Refinement<'_> {
     /// Refines from `start`; `None` where the model has no value for a row on the way.
     pub(super) fn fit(&self, start: Start, with_shapes: bool) -> Result<Option<Fit>, Failure> {
         let unknowns = Unknowns::of(self.subject.hypotheses(), &start.settings, with_shapes);
-        if self.nonlinear { self.descend(start, unknowns) } else { self.step(start.settings, unknowns) }
+        if self.nonlinear { self.descend(&start, unknowns) } else { self.step(start.settings, unknowns) }
     }
 
     /// Gauss-Newton, every step taken as it comes.

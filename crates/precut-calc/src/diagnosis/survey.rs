@@ -28,12 +28,11 @@ const SHARES: [f64; 2] = [1.0, 0.3];
 const WORTH_IT: f64 = 0.01;
 /// Share of what was measured that a place may leave and still explain it.
 const LITTLE: f64 = 0.1;
-/// Where it does not: how many of the places far from the straight line, for every one that is used, are gone downhill from a
-/// few steps, and how many then to the end. Halfway between two points that are tried a narrow valley leaves hardly less than
-/// its surroundings.
-const OF_EACH_FAR: usize = 12;
 /// Share of the largest size below which a straight line tells of a wave.
 const SMALL: f64 = 0.2;
+/// How many of the places far from the straight line, for every one that is used, are gone downhill from a few steps, and how
+/// many then to the end: halfway between two points that are tried a narrow valley leaves hardly less than its surroundings.
+const OF_EACH_FAR: usize = 12;
 const FEW_STEPS: usize = 2;
 const OF_EACH_NEARER: usize = 2;
 /// First move along one variable, share of the largest size.
@@ -222,7 +221,7 @@ impl<'a> Survey<'a> {
 
     /// What the model changes against 0, roughly.
     fn at_all(&self, settings: Vec<Setting>) -> Result<Vec<Place>, Failure> {
-        changes(settings, &|settings| self.subject.predict_roughly(settings))
+        changes(settings, &|settings: &[Setting]| self.subject.predict_roughly(settings))
     }
 
     /// What was measured and is not explained at a place.
@@ -370,10 +369,10 @@ impl<'a> Survey<'a> {
 }
 
 /// What a model changes at settings against 0; those at which it has no value are left out.
-fn changes(
-    settings: Vec<Setting>,
-    predict: &(dyn Fn(&[Setting]) -> Result<Vec<Prediction>, Failure> + Sync),
-) -> Result<Vec<Place>, Failure> {
+fn changes<P>(settings: Vec<Setting>, predict: &P) -> Result<Vec<Place>, Failure>
+where
+    P: Fn(&[Setting]) -> Result<Vec<Prediction>, Failure> + Sync,
+{
     let without = predict(&[])?;
     let place = |setting: Setting| {
         let with = predict(std::slice::from_ref(&setting))?;
