@@ -9,11 +9,11 @@ use precut_calc::diagnosis::{
 };
 use precut_calc::effects::DEFLECTION_CAUSES;
 
-const SIGMA: f64 = 0.05;
+pub(crate) const SIGMA: f64 = 0.05;
 const PRIOR_SD: f64 = 1.0;
 
 /// f(x) = sum over k of shape(k, theta_k, x).
-struct Curves {
+pub(crate) struct Curves {
     hypotheses: Vec<Hypothesis>,
     x: Vec<f64>,
     shape: fn(usize, f64, f64) -> f64,
@@ -23,7 +23,7 @@ struct Curves {
 
 impl Curves {
     /// One hypothesis of so many sizes.
-    fn new(sizes: usize, range: Range, shape: fn(usize, f64, f64) -> f64) -> Self {
+    pub(crate) fn new(sizes: usize, range: Range, shape: fn(usize, f64, f64) -> f64) -> Self {
         let treatment = Treatment::Amplitude { prior_sd: PRIOR_SD };
         let variable = Variable { name: "size", unit: "1", treatment, range };
         let cause = &DEFLECTION_CAUSES[0];
@@ -71,7 +71,7 @@ impl Subject for Curves {
 }
 
 /// Measured values with a known scatter: repeatable, of the size of sigma, without pattern.
-fn data(curves: &Curves, truth: &[f64]) -> Data {
+pub(crate) fn data(curves: &Curves, truth: &[f64]) -> Data {
     let noise = |i: usize| SIGMA * 1.4 * (12.9898 * (i as f64 + 1.0)).sin();
     let value = curves.at(truth).iter().enumerate().map(|(i, f)| f + noise(i)).collect();
     let count = curves.x.len();
@@ -89,7 +89,7 @@ fn data(curves: &Curves, truth: &[f64]) -> Data {
 }
 
 /// |y - f(theta)|^2 / sigma^2 + |theta|^2 / prior^2, in plain sums.
-fn misfit(curves: &Curves, data: &Data, sizes: &[f64]) -> f64 {
+pub(crate) fn misfit(curves: &Curves, data: &Data, sizes: &[f64]) -> f64 {
     let rows = data.value.iter().zip(curves.at(sizes)).map(|(y, f)| ((y - f) / SIGMA).powi(2)).sum::<f64>();
     rows + sizes.iter().map(|size| (size / PRIOR_SD).powi(2)).sum::<f64>()
 }
@@ -102,7 +102,7 @@ fn profiled<T>(curves: &Curves, data: &Data, look: impl FnOnce(&SetWeight, &[Pro
     look(set, &profiles)
 }
 
-const WIDE: Range = Range { lower: -10.0, upper: 10.0 };
+pub(crate) const WIDE: Range = Range { lower: -10.0, upper: 10.0 };
 
 #[test]
 fn of_a_linear_model_the_profile_is_the_square_of_the_distance() {

@@ -33,6 +33,7 @@ mod diagnosis_calibration;
 mod diagnosis_claims;
 mod diagnosis_classes;
 mod diagnosis_deflection;
+mod diagnosis_descent;
 mod diagnosis_known;
 mod diagnosis_next;
 mod diagnosis_profiles;

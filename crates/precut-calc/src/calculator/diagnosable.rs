@@ -138,6 +138,16 @@ pub trait Diagnosable:
         Self::predict(prepared, effects, monitor)
     }
 
+    /// The prediction as the search for the places of a hypothesis needs it: with numerics that only say where the model comes near
+    /// to the rows.
+    fn predict_roughly(
+        prepared: &Self::Prepared,
+        effects: &[Self::Effect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Prediction>, Failure> {
+        Self::predict_coarsely(prepared, effects, monitor)
+    }
+
     /// Expected time of one prediction of one run, ms: a diagnosis makes some hundreds. 0 where it is next to nothing
     /// beside the statistics.
     fn predict_ms(_job: &Self::Job) -> f64 {

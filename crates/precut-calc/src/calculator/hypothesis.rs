@@ -143,11 +143,15 @@ impl Expansions {
 
     /// About so many of the places that lie farthest from 0, spread over their order.
     pub fn outermost(&self, count: usize) -> Vec<Vec<f64>> {
+        let rim = self.beyond(0.999);
+        rim.iter().step_by((rim.len() / count.max(1)).max(1)).cloned().collect()
+    }
+
+    /// The places farther from 0 than a share of the farthest.
+    pub fn beyond(&self, share: f64) -> Vec<Vec<f64>> {
         let distance = |place: &[f64]| place.iter().map(|value| value * value).sum::<f64>().sqrt();
         let farthest = self.places.iter().map(|place| distance(place)).fold(0.0, f64::max);
-        let rim: Vec<&[f64]> =
-            self.places.iter().map(Vec::as_slice).filter(|place| distance(place) > 0.999 * farthest).collect();
-        rim.iter().step_by((rim.len() / count.max(1)).max(1)).map(|place| place.to_vec()).collect()
+        self.places.iter().filter(|place| distance(place) > share * farthest).cloned().collect()
     }
 }
 

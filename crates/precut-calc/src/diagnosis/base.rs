@@ -15,8 +15,6 @@ use crate::calculator::{
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
 const DEAR_MS: f64 = 5.0;
-/// Up to this time a simulation is short: then all single causes are looked for in all their places.
-const SHORT_MS: f64 = 20.0;
 
 /// Step of a divided difference, prior standard deviations (of a shape without a prior: of its value).
 ///
@@ -35,9 +33,9 @@ pub struct Bound<'a, M: Diagnosable> {
     hypotheses: Hypotheses,
     logarithmic: bool,
     dear: bool,
-    short: bool,
-    /// The base with the numerics of divided differences.
+    /// The base with the numerics of divided differences, and of a search.
     coarse_base: OnceLock<Vec<Prediction>>,
+    rough_base: OnceLock<Vec<Prediction>>,
     monitor: &'a dyn Monitor,
 }
 
@@ -63,9 +61,9 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
         }
         weigh(&mut hypotheses.applicable, &options.prior_weights);
         let ms = M::predict_cost(&prepared).ms;
-        let (dear, short) = (ms > DEAR_MS, ms <= SHORT_MS);
-        let coarse_base = OnceLock::new();
-        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, short, coarse_base, monitor })
+        let dear = ms > DEAR_MS;
+        let (coarse_base, rough_base) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { prepared, known, allowances, hypotheses, logarithmic, dear, coarse_base, rough_base, monitor })
     }
 
     /// The forward model's own view of the rows.
@@ -80,7 +78,7 @@ impl<'a, M: Diagnosable> Bound<'a, M> {
 
     /// The whole search over its rows.
     pub(super) fn effort(&self, most_causes: usize) -> Effort {
-        Effort::of(most_causes, self.dear, self.short)
+        Effort::of(most_causes, self.dear)
     }
 
     /// What these rows can and cannot speak about.
@@ -315,6 +313,20 @@ where
 
     fn predict_coarsely(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
         self.centre(settings)
+    }
+
+    fn predict_roughly(&self, settings: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        let at = |settings: &[Setting]| {
+            Ok(self.in_unit(M::predict_roughly(&self.prepared, &self.with_settings(settings)?, self.monitor)?))
+        };
+        match self.rough_base.get() {
+            _ if !settings.is_empty() => at(settings),
+            Some(base) => Ok(base.clone()),
+            None => {
+                let base = at(&[])?;
+                Ok(self.rough_base.get_or_init(|| base).clone())
+            }
+        }
     }
 
     /// Sizes that the model is linearised about. Those of a change of a held effect are counted from what the base holds.

@@ -30,6 +30,7 @@ mod class_likelihood;
 mod classes;
 mod copies;
 mod data;
+mod descent;
 mod discrepancy;
 mod downstream;
 mod evidence;

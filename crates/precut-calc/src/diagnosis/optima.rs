@@ -67,7 +67,7 @@ pub(super) fn elsewhere(
         let is_new = |others: &[Fit], settings: &[Setting]| {
             others.iter().chain([fit]).all(|known| distance(known, settings) > APART)
         };
-        if others.len() == MOST || !is_new(&others, &start) {
+        if others.len() == MOST || !is_new(&others, &start.settings) {
             continue;
         }
         let found = refinement.fit(start, fit.with_shapes)?;

@@ -3,9 +3,8 @@
 use super::discrepancy::{self, Kind, Remainder};
 use super::evidence::Side;
 use super::optima::{Optimum, elsewhere};
-use super::refine::{Fit, Refinement};
+use super::refine::{Fit, Refinement, Start};
 use super::search::{Candidate, Linear, by_weight};
-use super::subject::Setting;
 use super::weigh::SetWeight;
 use super::whiten::White;
 use crate::calculator::{Failure, Monitor, checkpoint};
@@ -113,7 +112,7 @@ impl Ranking {
                 continue;
             }
             let candidate = &mut self.candidates[index];
-            let start = linear.settings(candidate);
+            let start = linear.start_of(candidate);
             let fit = if linear.is_off_grid(candidate) {
                 // Its shapes were free before, and have paid for it.
                 let free = refinement.fit(start, true)?;
@@ -247,7 +246,7 @@ impl Ranking {
 /// Refines from a point of the grids: with free shapes where that explains more than the mean over the grid, else on it.
 fn refine_from_grid(
     candidate: &mut Candidate,
-    start: Vec<Setting>,
+    start: Start,
     linear: &Linear<'_>,
     refinement: &Refinement<'_>,
 ) -> Result<Option<Fit>, Failure> {

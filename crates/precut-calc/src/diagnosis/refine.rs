@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::discrepancy::Remainder;
-use super::evidence::{Normal, Side};
+use super::evidence::{Evidence, Normal, Side};
 use super::likelihood::Likelihood;
 use super::subject::{Setting, Subject};
 use super::whiten::White;
@@ -13,15 +13,22 @@ use crate::calculator::{Failure, Hypothesis, Monitor, Range, Shape, Treatment, V
 const STEPS: usize = 4;
 /// Steps where shapes are free too.
 const STEPS_WITH_SHAPES: usize = 6;
-/// Steps where the model is far from linear.
-const STEPS_NONLINEAR: usize = 8;
 /// Longest step, prior standard deviations.
 const LONGEST_STEP: f64 = 2.0;
-/// Shares of a step that are tried where the whole one leads astray.
-const SHORTENED: [f64; 3] = [0.4, 0.15, 0.05];
 /// A step shorter than this changes nothing that is reported: a hundredth of a prior standard deviation,
 /// or of a posterior one where that is smaller.
-const SETTLED: f64 = 0.01;
+pub(super) const SETTLED: f64 = 0.01;
+/// Where the steps end before that, one shorter than this still says that the optimum is near.
+const SHORT: f64 = 0.2;
+
+/// Where a refinement begins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Start {
+    /// The optimum of the model as it was linearised.
+    pub(super) settings: Vec<Setting>,
+    /// About what it was linearised.
+    pub(super) about: Vec<Setting>,
+}
 
 /// A set of causes fitted with the model linearised at its optimum.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,6 +161,8 @@ pub(super) struct Refinement<'a> {
     pub(super) value: &'a [f64],
     pub(super) keep: &'a [bool],
     pub(super) likelihood: &'a Likelihood,
+    /// Minus twice the log-likelihood of the base alone.
+    pub(super) misfit_of_base: f64,
     /// Whether the model is far from linear in its sizes.
     pub(super) nonlinear: bool,
     pub(super) monitor: &'a dyn Monitor,
@@ -161,96 +170,26 @@ pub(super) struct Refinement<'a> {
 
 impl Refinement<'_> {
     /// Refines from `start`; `None` where the model has no value for a row on the way.
-    pub(super) fn fit(&self, start: Vec<Setting>, with_shapes: bool) -> Result<Option<Fit>, Failure> {
-        let hypotheses = self.subject.hypotheses();
-        let (free, coordinates) = free_values(hypotheses, &start, with_shapes);
-        let variable = |k: usize| {
-            let (member, variable): (usize, usize) = free[k];
-            &hypotheses[start[member].hypothesis].variables[variable]
-        };
-        let ranges: Vec<_> = (0..free.len()).map(|k| variable(k).range).collect();
-        let sides: Vec<Side> = coordinates.iter().zip(&ranges).map(|(c, range)| c.side(*range)).collect();
-        let with_shapes = coordinates.iter().any(|c| matches!(c, Coordinate::Shape(_)));
-        let most = if self.nonlinear {
-            STEPS_NONLINEAR
-        } else if with_shapes {
-            STEPS_WITH_SHAPES
-        } else {
-            STEPS
-        };
+    pub(super) fn fit(&self, start: Start, with_shapes: bool) -> Result<Option<Fit>, Failure> {
+        let unknowns = Unknowns::of(self.subject.hypotheses(), &start.settings, with_shapes);
+        if self.nonlinear { self.descend(&start, unknowns) } else { self.step(start.settings, unknowns) }
+    }
+
+    /// Gauss-Newton, every step taken as it comes.
+    fn step(&self, start: Vec<Setting>, unknowns: Unknowns) -> Result<Option<Fit>, Failure> {
+        let most = if unknowns.with_shapes() { STEPS_WITH_SHAPES } else { STEPS };
         let mut settings = start;
         let mut step = 0;
-        // Of the settings, where the step before has predicted it.
-        let mut known: Option<Vec<f64>> = None;
         loop {
             checkpoint(self.monitor)?;
-            let raw = match known.take() {
-                Some(raw) => raw,
-                None => match self.raw_residual(&settings)? {
-                    Some(raw) => raw,
-                    None => return Ok(None),
-                },
-            };
-            let here = self.linearise(&raw, &settings, &free, &coordinates)?;
-            let columns: Vec<&White> = here.columns.iter().collect();
-            let Some(evidence) = self.likelihood.evidence(&columns, &here.residual, &sides) else { return Ok(None) };
-            let before = settings.clone();
-            let moved = |share: f64| {
-                let mut longest: f64 = 0.0;
-                let mut settings = before.clone();
-                for (k, coordinate) in coordinates.iter().enumerate() {
-                    let (member, variable) = free[k];
-                    let value = &mut settings[member].values[variable];
-                    let before = coordinate.t(*value);
-                    let wanted = before + share * (evidence.t[k] - before).clamp(-LONGEST_STEP, LONGEST_STEP);
-                    // Projected on the bounds: a reflection would swing to and fro about an optimum at a bound.
-                    *value = coordinate.moved(wanted, ranges[k]);
-                    let posterior_sd = evidence.covariance[(k, k)].sqrt();
-                    longest = longest.max((coordinate.t(*value) - before).abs() / posterior_sd.clamp(0.05, 1.0));
-                }
-                (settings, longest)
-            };
-            let (next, longest) = moved(1.0);
+            let Some(raw) = self.raw_residual(&settings)? else { return Ok(None) };
+            let here = self.linearise(&raw, &settings, &unknowns.free, &unknowns.coordinates)?;
+            let Some(evidence) = here.evidence(self.likelihood, &unknowns) else { return Ok(None) };
+            let (next, longest) = unknowns.moved(&settings, &evidence, 1.0);
             settings = next;
             step += 1;
-            // Where shapes are free a step may pass by the resonance that it is looking for: then it is shortened.
-            if self.nonlinear && with_shapes && longest >= SETTLED && step < most {
-                let cost_here = self.cost(&raw, &before, &free, &coordinates);
-                for share in SHORTENED {
-                    checkpoint(self.monitor)?;
-                    known = self.raw_residual(&settings)?;
-                    let cost = known.as_ref().map(|raw| self.cost(raw, &settings, &free, &coordinates));
-                    if cost.is_some_and(|cost| cost <= cost_here) {
-                        break;
-                    }
-                    known = None;
-                    settings = moved(share).0;
-                }
-            }
-            let settled = longest < SETTLED;
-            if settled || step >= most {
-                let scale: Vec<f64> = free
-                    .iter()
-                    .zip(&coordinates)
-                    .map(|(&(member, variable), coordinate)| coordinate.slope(settings[member].values[variable]))
-                    .collect();
-                let covariance =
-                    DMatrix::from_fn(free.len(), free.len(), |i, j| evidence.covariance[(i, j)] * scale[i] * scale[j]);
-                return Ok(Some(Fit {
-                    settings,
-                    free,
-                    coordinates,
-                    log_z: evidence.log_z,
-                    covariance,
-                    t: evidence.t,
-                    sides,
-                    columns: here.columns,
-                    residual: here.residual,
-                    slopes: here.slopes,
-                    settled: settled || longest < 0.2,
-                    with_shapes,
-                    q: evidence.q,
-                }));
+            if longest < SETTLED || step >= most {
+                return Ok(Some(unknowns.fit(settings, evidence, here, longest < SHORT)));
             }
         }
     }
@@ -262,12 +201,8 @@ impl Refinement<'_> {
     }
 
     /// Twice minus the log-posterior, up to a constant, at settings that leave this of the rows.
-    fn cost(&self, raw: &[f64], settings: &[Setting], free: &[(usize, usize)], coordinates: &[Coordinate]) -> f64 {
-        let prior: f64 = free
-            .iter()
-            .zip(coordinates)
-            .map(|(&(member, variable), coordinate)| coordinate.t(settings[member].values[variable]).powi(2))
-            .sum();
+    pub(super) fn cost(&self, raw: &[f64], settings: &[Setting], unknowns: &Unknowns) -> f64 {
+        let prior: f64 = unknowns.coordinates_of(settings).map(|t| t * t).sum();
         self.likelihood.misfit(&self.likelihood.white(raw)) + prior
     }
 
@@ -276,7 +211,7 @@ impl Refinement<'_> {
         Ok(self.raw_residual(settings)?.map(|raw| self.likelihood.white(&raw)))
     }
 
-    fn raw_residual(&self, settings: &[Setting]) -> Result<Option<Vec<f64>>, Failure> {
+    pub(super) fn raw_residual(&self, settings: &[Setting]) -> Result<Option<Vec<f64>>, Failure> {
         let predicted = self.subject.predict(settings)?;
         let rows = self.value.iter().zip(predicted).zip(self.keep);
         Ok(rows.map(|((y, f), keep)| if *keep { f.ok().map(|f| y - f) } else { Some(0.0) }).collect())
@@ -315,7 +250,7 @@ impl Refinement<'_> {
     }
 
     /// About settings that leave `raw` of the rows.
-    fn linearise(
+    pub(super) fn linearise(
         &self,
         raw: &[f64],
         settings: &[Setting],
@@ -337,28 +272,124 @@ impl Refinement<'_> {
     }
 }
 
-struct Here {
-    residual: White,
-    columns: Vec<White>,
+/// The model about a place.
+pub(super) struct Here {
+    /// y - f(theta) + X t there, whitened.
+    pub(super) residual: White,
+    /// Whitened, at one prior standard deviation.
+    pub(super) columns: Vec<White>,
     slopes: Vec<Vec<f64>>,
 }
 
-fn free_values(
-    hypotheses: &[Hypothesis],
-    settings: &[Setting],
-    with_shapes: bool,
-) -> (Vec<(usize, usize)>, Vec<Coordinate>) {
-    let mut free = Vec::new();
-    let mut coordinates = Vec::new();
-    for (member, setting) in settings.iter().enumerate() {
-        for (index, variable) in hypotheses[setting.hypothesis].variables.iter().enumerate() {
-            let Some(coordinate) = Coordinate::of(variable) else { continue };
-            if matches!(coordinate, Coordinate::Shape(_)) && !with_shapes {
-                continue;
+impl Here {
+    pub(super) fn evidence(&self, likelihood: &Likelihood, unknowns: &Unknowns) -> Option<Evidence> {
+        likelihood.evidence(&self.columns.iter().collect::<Vec<_>>(), &self.residual, &unknowns.sides)
+    }
+
+    /// What the straight model foretells of the cost at coordinates.
+    pub(super) fn foretold(&self, likelihood: &Likelihood, t: &[f64]) -> f64 {
+        let left = self.columns.iter().zip(t).fold(self.residual.clone(), |left, (x, t)| left.minus(&x.times(*t)));
+        likelihood.misfit(&left) + t.iter().map(|t| t * t).sum::<f64>()
+    }
+}
+
+/// What is free of a set while it is refined.
+pub(super) struct Unknowns {
+    /// Member of the set and its variable.
+    free: Vec<(usize, usize)>,
+    coordinates: Vec<Coordinate>,
+    ranges: Vec<Range>,
+    sides: Vec<Side>,
+}
+
+impl Unknowns {
+    fn of(hypotheses: &[Hypothesis], settings: &[Setting], with_shapes: bool) -> Self {
+        let mut unknowns = Self { free: Vec::new(), coordinates: Vec::new(), ranges: Vec::new(), sides: Vec::new() };
+        for (member, setting) in settings.iter().enumerate() {
+            for (index, variable) in hypotheses[setting.hypothesis].variables.iter().enumerate() {
+                let Some(coordinate) = Coordinate::of(variable) else { continue };
+                if matches!(coordinate, Coordinate::Shape(_)) && !with_shapes {
+                    continue;
+                }
+                unknowns.free.push((member, index));
+                unknowns.coordinates.push(coordinate);
+                unknowns.ranges.push(variable.range);
+                unknowns.sides.push(coordinate.side(variable.range));
             }
-            free.push((member, index));
-            coordinates.push(coordinate);
+        }
+        unknowns
+    }
+
+    fn with_shapes(&self) -> bool {
+        self.coordinates.iter().any(|coordinate| matches!(coordinate, Coordinate::Shape(_)))
+    }
+
+    pub(super) fn coordinates_of(&self, settings: &[Setting]) -> impl Iterator<Item = f64> {
+        let of = |(&(member, variable), coordinate): (&(usize, usize), &Coordinate)| {
+            coordinate.t(settings[member].values[variable])
+        };
+        self.free.iter().zip(&self.coordinates).map(of)
+    }
+
+    /// The model linearised about settings.
+    pub(super) fn linearised(
+        &self,
+        refinement: &Refinement<'_>,
+        raw: &[f64],
+        settings: &[Setting],
+    ) -> Result<Here, Failure> {
+        refinement.linearise(raw, settings, &self.free, &self.coordinates)
+    }
+
+    /// Settings at coordinates, within their bounds.
+    pub(super) fn at(&self, settings: &[Setting], t: impl IntoIterator<Item = f64>) -> Vec<Setting> {
+        let mut settings = settings.to_vec();
+        for (k, t) in t.into_iter().enumerate() {
+            let (member, variable) = self.free[k];
+            settings[member].values[variable] = self.coordinates[k].moved(t, self.ranges[k]);
+        }
+        settings
+    }
+
+    /// A share of the way to the optimum of the straight model, and its longest move in posterior standard deviations. What
+    /// would pass its bound is projected on it: a reflection would swing to and fro about an optimum at a bound.
+    pub(super) fn moved(&self, settings: &[Setting], evidence: &Evidence, share: f64) -> (Vec<Setting>, f64) {
+        let before: Vec<f64> = self.coordinates_of(settings).collect();
+        let step = |(t, wanted): (&f64, &f64)| t + share * (wanted - t).clamp(-LONGEST_STEP, LONGEST_STEP);
+        let moved = self.at(settings, before.iter().zip(&evidence.t).map(step));
+        let longest = self
+            .coordinates_of(&moved)
+            .zip(&before)
+            .enumerate()
+            .map(|(k, (t, before))| (t - before).abs() / evidence.covariance[(k, k)].sqrt().clamp(0.05, 1.0))
+            .fold(0.0, f64::max);
+        (moved, longest)
+    }
+
+    /// The fit at settings about which, or nearly so, the model was linearised.
+    pub(super) fn fit(self, settings: Vec<Setting>, evidence: Evidence, here: Here, settled: bool) -> Fit {
+        let scale: Vec<f64> = self
+            .free
+            .iter()
+            .zip(&self.coordinates)
+            .map(|(&(member, variable), coordinate)| coordinate.slope(settings[member].values[variable]))
+            .collect();
+        let of = |i: usize, j: usize| evidence.covariance[(i, j)] * scale[i] * scale[j];
+        let covariance = DMatrix::from_fn(scale.len(), scale.len(), of);
+        Fit {
+            settings,
+            with_shapes: self.with_shapes(),
+            free: self.free,
+            coordinates: self.coordinates,
+            log_z: evidence.log_z,
+            covariance,
+            t: evidence.t,
+            sides: self.sides,
+            columns: here.columns,
+            residual: here.residual,
+            slopes: here.slopes,
+            settled,
+            q: evidence.q,
         }
     }
-    (free, coordinates)
 }

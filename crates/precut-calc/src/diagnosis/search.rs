@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::evidence::{Evidence, Normal, Side, log_sum_exp};
 use super::likelihood::Likelihood;
 use super::optima::Peak;
+use super::refine::Start;
 use super::signatures::{Signatures, Variant};
 use super::subject::Setting;
 use super::whiten::White;
@@ -261,11 +262,10 @@ impl<'a> Linear<'a> {
     }
 
     /// The settings that a set has about each of its places, and the evidence there, largest first.
-    pub(super) fn starts(&self, members: &[usize]) -> Vec<(Vec<Setting>, f64)> {
+    pub(super) fn starts(&self, members: &[usize]) -> Vec<(Start, f64)> {
         let of = |point: Vec<usize>| {
             let evidence = self.evidence(members, &point)?;
-            let values = self.values(members, &point, &evidence.t);
-            Some((self.within_bounds(members, &point, values), evidence.log_z))
+            Some((self.start(members, &point, &evidence.t), evidence.log_z))
         };
         let mut starts: Vec<_> = self.points(members).into_iter().filter_map(of).collect();
         starts.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -407,6 +407,16 @@ impl<'a> Linear<'a> {
     pub(super) fn settings(&self, candidate: &Candidate) -> Vec<Setting> {
         let Candidate { members, variants, t, .. } = candidate;
         self.within_bounds(members, variants, self.values(members, variants, t))
+    }
+
+    /// Where the refinement of a candidate begins.
+    pub(super) fn start_of(&self, candidate: &Candidate) -> Start {
+        self.start(&candidate.members, &candidate.variants, &candidate.t)
+    }
+
+    fn start(&self, members: &[usize], variants: &[usize], t: &[f64]) -> Start {
+        let about = members.iter().zip(variants).map(|(&h, &v)| self.variant(h, v).setting.clone()).collect();
+        Start { settings: self.within_bounds(members, variants, self.values(members, variants, t)), about }
     }
 
     fn within_bounds(&self, members: &[usize], variants: &[usize], values: Vec<Vec<f64>>) -> Vec<Setting> {

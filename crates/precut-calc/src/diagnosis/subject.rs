@@ -17,6 +17,11 @@ pub trait Subject: Sync {
         self.predict(effects)
     }
 
+    /// The same with numerics that do no more than to say where it comes near to the rows.
+    fn predict_roughly(&self, effects: &[Setting]) -> Result<Vec<Prediction>, Failure> {
+        self.predict_coarsely(effects)
+    }
+
     /// Sizes of a hypothesis about which the model is linearised, too, beside 0.
     fn expansions(&self, _hypothesis: usize) -> Expansions {
         Expansions::default()

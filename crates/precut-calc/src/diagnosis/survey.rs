@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::basis::dot;
 use super::subject::{Setting, Subject};
-use crate::calculator::{Expansions, Failure, Hypothesis, JacobianColumn, Monitor, Range, checkpoint};
+use crate::calculator::{Expansions, Failure, Hypothesis, JacobianColumn, Monitor, Prediction, Range, checkpoint};
 
 /// Share of a change by which the model may miss its straight line at the largest sizes and still be called straight.
 const STRAIGHT: f64 = 0.05;
@@ -28,9 +28,13 @@ const SHARES: [f64; 2] = [1.0, 0.3];
 const WORTH_IT: f64 = 0.01;
 /// Share of what was measured that a place may leave and still explain it.
 const LITTLE: f64 = 0.1;
-/// Where it does not: which of the sizes are tried far from the straight line, and which points between those of the grid.
-const EVERY_PLACE: usize = 3;
-const EVERY_PART: usize = 2;
+/// Share of the largest size below which a straight line tells of a wave.
+const SMALL: f64 = 0.2;
+/// How many of the places far from the straight line, for every one that is used, are gone downhill from a few steps, and how
+/// many then to the end: halfway between two points that are tried a narrow valley leaves hardly less than its surroundings.
+const OF_EACH_FAR: usize = 12;
+const FEW_STEPS: usize = 2;
+const OF_EACH_NEARER: usize = 2;
 /// First move along one variable, share of the largest size.
 const FIRST_MOVE: f64 = 0.1;
 /// How often the moves are halved: to a quarter.
@@ -39,6 +43,11 @@ const HALVINGS: u32 = 3;
 const FELT: usize = 4;
 /// Places nearer to one another than this, on the scale of each variable, are one.
 const SAME: f64 = 0.02;
+/// Step of a divided difference of a size in prior standard deviations, of a shape in steps of its grid: predictions that are
+/// rough have errors of their own, but the same ones on both sides.
+const STEP: f64 = 1e-3;
+/// Points that are looked at between two questions whether anybody still waits.
+const AT_ONCE: usize = 16;
 
 /// A place beside 0 with what the model changes there against 0.
 pub(super) struct Place {
@@ -68,31 +77,33 @@ impl<'a> Survey<'a> {
         grid: &[Setting],
         monitor: &dyn Monitor,
     ) -> Result<Vec<(Option<usize>, Place)>, Failure> {
+        let predict = |settings: &[Setting]| self.subject.predict_coarsely(settings);
         if self.expansions.places.len() > self.expansions.nearest {
             let on_grid = self.declared().fitted_shapes().next().is_none().then_some(0);
-            return Ok(self.nearest(grid, monitor)?.into_iter().map(|place| (on_grid, place)).collect());
+            let nearest = self.nearest(grid, monitor)?.into_iter().map(|place| place.setting).collect();
+            return Ok(changes(nearest, &predict)?.into_iter().map(|place| (on_grid, place)).collect());
         }
         let mut found = Vec::new();
         for (point, at) in grid.iter().enumerate() {
             checkpoint(monitor)?;
-            let places = self.with_sizes(at, &self.expansions.places)?;
+            let places = changes(self.sized(at, &self.expansions.places), &predict)?;
             found.extend(places.into_iter().map(|place| (Some(point), place)));
         }
         Ok(found)
     }
 
-    /// The places that come nearest to the rows. At every point of the grid that shape is taken at which a straight line
-    /// explains most; from the best of these, and there from all the sizes given, downhill.
+    /// The places that come nearest to the rows: where a straight line explains most, at every point of the grid and at the points
+    /// between, and there all the sizes given; from the best of these downhill.
     fn nearest(&self, grid: &[Setting], monitor: &dyn Monitor) -> Result<Vec<Place>, Failure> {
-        let mut starts = Vec::new();
-        for at in grid {
+        let between: Vec<Setting> = grid.iter().flat_map(|at| self.refined(at)).collect();
+        let mut along = Vec::with_capacity(between.len());
+        for some in between.chunks(AT_ONCE) {
             checkpoint(monitor)?;
-            let settings = self.refined(at);
-            let fits: Vec<Vec<Place>> =
-                settings.par_iter().map(|at| self.straight_fit(at)).collect::<Result<_, Failure>>()?;
-            let best = fits.into_iter().flatten().min_by(|a, b| self.misfit(a).total_cmp(&self.misfit(b)));
-            starts.extend(best);
+            let fits: Vec<Option<Place>> =
+                some.par_iter().map(|at| self.straight_fit(at)).collect::<Result<_, Failure>>()?;
+            along.extend(fits);
         }
+        let mut starts = self.valleys(along);
         self.rank(&mut starts);
         let of_each = OF_EACH_START.max(self.expansions.nearest / starts.len().max(1));
         let mut straight = true;
@@ -108,13 +119,10 @@ impl<'a> Survey<'a> {
             self.rank(&mut near);
             found.extend(near.into_iter().take(of_each));
         }
-        for place in &mut found {
-            checkpoint(monitor)?;
-            self.step_downhill(place)?;
-        }
+        let mut found = self.downhill(found, STEPS, monitor)?;
         self.leave_one_of_each(&mut found);
         if !straight && self.expansions.parts > 1 && !found.first().is_some_and(|best| self.explains(best)) {
-            found.extend(self.far_from_straight(grid, monitor)?);
+            found.extend(self.far_from_straight(&between, monitor)?);
             self.leave_one_of_each(&mut found);
         }
         if !straight {
@@ -127,30 +135,37 @@ impl<'a> Survey<'a> {
         Ok(found)
     }
 
-    /// Where the best of those that a straight line leads to leaves much: all the sizes given at every point of the grid, a few at
-    /// points between, and from the best of these downhill. A large wave shows another shape than a small one, so that no
-    /// straight line tells which ratio it has; and one that comes back alike in every turn is found at that very ratio only.
-    fn far_from_straight(&self, grid: &[Setting], monitor: &dyn Monitor) -> Result<Vec<Place>, Failure> {
-        let few: Vec<Vec<f64>> = self.expansions.places.iter().step_by(EVERY_PLACE).cloned().collect();
+    /// Of places along a shape those that leave less than their neighbours.
+    fn valleys(&self, along: Vec<Option<Place>>) -> Vec<Place> {
+        let left: Vec<f64> =
+            along.iter().map(|place| place.as_ref().map_or(f64::INFINITY, |place| self.misfit(place))).collect();
+        let is_lower = |k: usize| {
+            let beside = |other: Option<usize>| other.and_then(|k| left.get(k)).copied().unwrap_or(f64::INFINITY);
+            left[k] < beside(k.checked_sub(1)) && left[k] <= beside(Some(k + 1))
+        };
+        along.into_iter().enumerate().filter(|(k, _)| is_lower(*k)).filter_map(|(_, place)| place).collect()
+    }
+
+    /// Where the best of those that a straight line leads to leaves much: all but the small sizes at every point between those of the
+    /// grid, and from the best of these downhill. A large wave shows another shape than a small one, so that no straight line
+    /// tells which ratio it has; and one that comes back alike in every turn is found at that very ratio only.
+    fn far_from_straight(&self, between: &[Setting], monitor: &dyn Monitor) -> Result<Vec<Place>, Failure> {
+        let far = self.expansions.beyond(SMALL);
         let mut found = Vec::new();
-        for at in grid {
+        for at in between {
             checkpoint(monitor)?;
-            let mut best = |at: &Setting, sizes: &[Vec<f64>]| {
-                let places = self.with_sizes(&self.at_zero(at), sizes)?;
-                found.extend(places.into_iter().min_by(|a, b| self.misfit(a).total_cmp(&self.misfit(b))));
-                Ok::<(), Failure>(())
-            };
-            best(at, &self.expansions.places)?;
-            for between in self.refined(at).iter().step_by(EVERY_PART) {
-                best(between, &few)?;
-            }
+            let places = self.with_sizes(&self.at_zero(at), &far)?;
+            found.extend(places.into_iter().min_by(|a, b| self.misfit(a).total_cmp(&self.misfit(b))));
         }
-        self.rank(&mut found);
-        for place in &mut found {
-            checkpoint(monitor)?;
-            self.step_downhill(place)?;
-        }
-        Ok(found)
+        self.rank_to(&mut found, OF_EACH_FAR * self.expansions.nearest);
+        let mut found = self.downhill(found, FEW_STEPS, monitor)?;
+        self.rank_to(&mut found, OF_EACH_NEARER * self.expansions.nearest);
+        self.downhill(found, STEPS, monitor)
+    }
+
+    fn downhill(&self, places: Vec<Place>, steps: usize, monitor: &dyn Monitor) -> Result<Vec<Place>, Failure> {
+        checkpoint(monitor)?;
+        places.into_par_iter().map(|place| self.step_downhill(place, steps)).collect()
     }
 
     /// Whether a place leaves little of what was measured.
@@ -190,33 +205,23 @@ impl<'a> Survey<'a> {
         zero
     }
 
-    fn with_sizes(&self, at: &Setting, sizes: &[Vec<f64>]) -> Result<Vec<Place>, Failure> {
-        let settings = sizes.iter().map(|sizes| {
+    /// A setting with other sizes.
+    fn sized(&self, at: &Setting, sizes: &[Vec<f64>]) -> Vec<Setting> {
+        let with = |sizes: &Vec<f64>| {
             let mut setting = at.clone();
             self.declared().amplitudes().zip(sizes).for_each(|((variable, _), size)| setting.values[variable] = *size);
             setting
-        });
-        self.at_all(settings.collect())
+        };
+        sizes.iter().map(with).collect()
     }
 
-    /// What the model changes against 0; places where it has no value are left out.
+    fn with_sizes(&self, at: &Setting, sizes: &[Vec<f64>]) -> Result<Vec<Place>, Failure> {
+        self.at_all(self.sized(at, sizes))
+    }
+
+    /// What the model changes against 0, roughly.
     fn at_all(&self, settings: Vec<Setting>) -> Result<Vec<Place>, Failure> {
-        let without = self.subject.predict_coarsely(&[])?;
-        let place = |setting: Setting| {
-            let with = self.subject.predict_coarsely(std::slice::from_ref(&setting))?;
-            let change: Option<Vec<f64>> = with
-                .iter()
-                .zip(&without)
-                .map(|(with, without)| match (with, without) {
-                    (Ok(with), Ok(without)) => Some(with - without),
-                    (Err(_), Ok(_)) => None,
-                    _ => Some(0.0),
-                })
-                .collect();
-            Ok(change.map(|change| Place { setting, change }))
-        };
-        let places: Vec<Option<Place>> = settings.into_par_iter().map(place).collect::<Result<_, Failure>>()?;
-        Ok(places.into_iter().flatten().collect())
+        changes(settings, &|settings: &[Setting]| self.subject.predict_roughly(settings))
     }
 
     /// What was measured and is not explained at a place.
@@ -226,8 +231,12 @@ impl<'a> Survey<'a> {
 
     /// Leaves those that come nearest to the rows, nearest first.
     fn rank(&self, places: &mut Vec<Place>) {
+        self.rank_to(places, self.expansions.nearest);
+    }
+
+    fn rank_to(&self, places: &mut Vec<Place>, count: usize) {
         places.sort_by(|a, b| self.misfit(a).total_cmp(&self.misfit(b)));
-        places.truncate(self.expansions.nearest);
+        places.truncate(count);
     }
 
     fn leave_one_of_each(&self, places: &mut Vec<Place>) {
@@ -245,26 +254,44 @@ impl<'a> Survey<'a> {
         *places = kept;
     }
 
-    fn slopes(&self, at: &Setting, of: &[(usize, f64)]) -> Result<Vec<JacobianColumn>, Failure> {
-        let of: Vec<(usize, usize)> = of.iter().map(|(variable, _)| (0, *variable)).collect();
-        self.subject.jacobian(std::slice::from_ref(at), &of)
+    /// What one unit of every variable, given with its scale, changes beside a place.
+    fn slopes(&self, beside: &Place, of: &[(usize, f64)]) -> Result<Vec<JacobianColumn>, Failure> {
+        let slope = |&(variable, scale): &(usize, f64)| {
+            let at = beside.setting.values[variable];
+            let inwards = if at + STEP * scale <= self.range(variable).upper { STEP } else { -STEP };
+            let mut moved = beside.setting.clone();
+            moved.values[variable] = at + inwards * scale;
+            let with = self.at_all(vec![moved])?.pop();
+            let per_unit = |with: Place| {
+                let change = with.change.iter().zip(&beside.change);
+                change.map(|(with, without)| (with - without) / (inwards * scale)).collect()
+            };
+            Ok(with.map_or_else(|| vec![0.0; self.residual.len()], per_unit))
+        };
+        of.iter().map(slope).collect()
+    }
+
+    /// A place without sizes, where nothing changes.
+    fn unchanged(&self, at: &Setting) -> Place {
+        Place { setting: self.at_zero(at), change: vec![0.0; self.residual.len()] }
     }
 
     /// The place where the straight line through 0 comes nearest to the rows.
-    fn straight_fit(&self, at: &Setting) -> Result<Vec<Place>, Failure> {
+    fn straight_fit(&self, at: &Setting) -> Result<Option<Place>, Failure> {
         let sizes: Vec<(usize, f64)> = self.declared().amplitudes().collect();
-        let Some(fit) = least_squares(&self.slopes(at, &sizes)?, self.residual) else { return Ok(Vec::new()) };
+        let slopes = self.slopes(&self.unchanged(at), &sizes)?;
+        let Some(fit) = least_squares(&slopes, self.residual) else { return Ok(None) };
         let mut setting = at.clone();
         for (&(size, prior_sd), fit) in sizes.iter().zip(&fit) {
             setting.values[size] = self.range(size).clamp(fit.clamp(-FARTHEST * prior_sd, FARTHEST * prior_sd));
         }
-        self.at_all(vec![setting])
+        Ok(self.at_all(vec![setting])?.pop())
     }
 
     /// Whether the straight line through 0 foretells what the model does at the largest sizes, or nothing is seen of them.
     fn is_straight(&self, at: &Setting) -> Result<bool, Failure> {
         let sizes: Vec<(usize, f64)> = self.declared().amplitudes().collect();
-        let slopes = self.slopes(at, &sizes)?;
+        let slopes = self.slopes(&self.unchanged(at), &sizes)?;
         let outermost = self.expansions.outermost(DIRECTIONS);
         let places = self.with_sizes(at, &outermost)?;
         let foretold = |place: &Place| {
@@ -280,14 +307,14 @@ impl<'a> Survey<'a> {
         Ok(places.len() == outermost.len() && places.iter().all(foretold))
     }
 
-    /// By Gauss-Newton steps while they help.
-    fn step_downhill(&self, place: &mut Place) -> Result<(), Failure> {
+    /// By Gauss-Newton steps while they help, so many at most.
+    fn step_downhill(&self, mut place: Place, steps: usize) -> Result<Place, Failure> {
         let free = self.free();
-        for _ in 0..STEPS {
-            let slopes = self.slopes(&place.setting, &free)?;
+        for _ in 0..steps {
+            let slopes = self.slopes(&place, &free)?;
             let left: Vec<f64> = self.residual.iter().zip(&place.change).map(|(r, change)| r - change).collect();
-            let Some(step) = least_squares(&slopes, &left) else { return Ok(()) };
-            let shortened = SHARES.iter().map(|share| {
+            let Some(step) = least_squares(&slopes, &left) else { break };
+            let shortened = SHARES.map(|share| {
                 let mut setting = place.setting.clone();
                 for (&(variable, scale), step) in free.iter().zip(&step) {
                     let by = share * step.clamp(-scale, scale);
@@ -295,11 +322,11 @@ impl<'a> Survey<'a> {
                 }
                 setting
             });
-            if !self.improve(place, shortened.collect(), WORTH_IT)? {
-                return Ok(());
+            if !self.improve(&mut place, shortened.to_vec(), WORTH_IT)? {
+                break;
             }
         }
-        Ok(())
+        Ok(place)
     }
 
     /// Along each variable in turn, by moves that are halved where none helps: a simulation whose teeth move has more
@@ -341,6 +368,29 @@ impl<'a> Survey<'a> {
     }
 }
 
+/// What a model changes at settings against 0; those at which it has no value are left out.
+fn changes<P>(settings: Vec<Setting>, predict: &P) -> Result<Vec<Place>, Failure>
+where
+    P: Fn(&[Setting]) -> Result<Vec<Prediction>, Failure> + Sync,
+{
+    let without = predict(&[])?;
+    let place = |setting: Setting| {
+        let with = predict(std::slice::from_ref(&setting))?;
+        let change: Option<Vec<f64>> = with
+            .iter()
+            .zip(&without)
+            .map(|(with, without)| match (with, without) {
+                (Ok(with), Ok(without)) => Some(with - without),
+                (Err(_), Ok(_)) => None,
+                _ => Some(0.0),
+            })
+            .collect();
+        Ok(change.map(|change| Place { setting, change }))
+    };
+    let places: Vec<Option<Place>> = settings.into_par_iter().map(place).collect::<Result<_, Failure>>()?;
+    Ok(places.into_iter().flatten().collect())
+}
+
 /// x of least |target - columns x|; `None` where the columns do not determine it.
 fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
     let count = columns.len();
@@ -353,125 +403,4 @@ fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::calculator::{Hypothesis, Prediction, Shape, Treatment, Unwatched, Variable};
-    use crate::effects::RING_CAUSES;
-
-    /// A wave of two quadratures with a ratio, whose phase turns with its amplitude.
-    struct Wave {
-        hypotheses: Vec<Hypothesis>,
-        turns_per_size: f64,
-        parts: u32,
-    }
-
-    const ROWS: usize = 200;
-    const NEAREST: usize = 6;
-
-    impl Wave {
-        fn new(turns_per_size: f64, ratios: Vec<f64>, parts: u32) -> Self {
-            let variable =
-                |name, treatment, lower, upper| Variable { name, unit: "mm", treatment, range: Range { lower, upper } };
-            let size = || Treatment::Amplitude { prior_sd: 1.0 };
-            let prior = (ratios.len() > 1).then_some(Shape { mean: 5.0, sd: 3.0, logarithmic: false });
-            let variables = vec![
-                variable("cos", size(), -10.0, 10.0),
-                variable("sin", size(), -10.0, 10.0),
-                variable("ratio", Treatment::Shape { grid: ratios, prior }, 0.5, 50.0),
-            ];
-            let cause = &RING_CAUSES[0];
-            let hypotheses = vec![Hypothesis { cause, label: String::new(), variables, prior_weight: 1.0, held: None }];
-            Self { hypotheses, turns_per_size, parts }
-        }
-
-        fn rows(&self, values: &[f64]) -> Vec<f64> {
-            let (amplitude, phase) = (values[0].hypot(values[1]), values[1].atan2(values[0]));
-            let of = |i: usize| 20.0 * i as f64 / ROWS as f64;
-            let turned = phase + self.turns_per_size * std::f64::consts::TAU * amplitude;
-            (0..ROWS).map(|i| amplitude * (values[2] * of(i) + turned).cos()).collect()
-        }
-
-        fn nearest(&self, truth: &[f64]) -> (Vec<Place>, Vec<f64>) {
-            let residual = self.rows(truth);
-            let grid: Vec<Setting> = match &self.hypotheses[0].variables[2].treatment {
-                Treatment::Shape { grid, .. } => grid.clone(),
-                _ => Vec::new(),
-            }
-            .into_iter()
-            .map(|ratio| Setting { hypothesis: 0, values: vec![0.0, 0.0, ratio] })
-            .collect();
-            let places = Survey::new(self, 0, &residual).places(&grid, &Unwatched).expect("nothing cancels it");
-            (places.into_iter().map(|(_, place)| place).collect(), residual)
-        }
-    }
-
-    impl Subject for Wave {
-        fn hypotheses(&self) -> &[Hypothesis] {
-            &self.hypotheses
-        }
-
-        fn predict(&self, effects: &[Setting]) -> Result<Vec<Prediction>, Failure> {
-            let values = effects.first().map_or(vec![0.0; ROWS], |setting| self.rows(&setting.values));
-            Ok(values.into_iter().map(Ok).collect())
-        }
-
-        fn expansions(&self, _hypothesis: usize) -> Expansions {
-            let of = |k: usize, size: f64| {
-                let (sin, cos) = (std::f64::consts::TAU * k as f64 / 12.0).sin_cos();
-                vec![size * cos, size * sin]
-            };
-            let places = [0.4, 0.8, 1.2].iter().flat_map(|&size| (0..12).map(move |k| of(k, size))).collect();
-            Expansions { places, nearest: NEAREST, parts: self.parts }
-        }
-
-        fn jacobian(&self, effects: &[Setting], of: &[(usize, usize)]) -> Result<Vec<JacobianColumn>, Failure> {
-            let slope = |&(member, variable): &(usize, usize)| {
-                let mut moved = effects[member].values.clone();
-                moved[variable] += 1e-6;
-                let (with, without) = (self.rows(&moved), self.rows(&effects[member].values));
-                with.iter().zip(&without).map(|(with, without)| (with - without) / 1e-6).collect()
-            };
-            Ok(of.iter().map(slope).collect())
-        }
-
-        fn nuisances(&self) -> Result<Vec<JacobianColumn>, Failure> {
-            Ok(Vec::new())
-        }
-    }
-
-    /// Share of what was measured that a place leaves.
-    fn left(place: &Place, residual: &[f64]) -> f64 {
-        let left: Vec<f64> = residual.iter().zip(&place.change).map(|(r, change)| r - change).collect();
-        dot(&left, &left) / dot(residual, residual)
-    }
-
-    #[test]
-    fn a_straight_model_has_one_place_where_least_squares_puts_it() {
-        let truth = [0.6, -0.9, 5.0];
-        let (places, residual) = Wave::new(0.0, vec![5.0], 1).nearest(&truth);
-        assert_eq!(places.len(), 1);
-        assert!(left(&places[0], &residual) < 1e-10);
-        let values = &places[0].setting.values;
-        assert!(values.iter().zip(truth).all(|(found, truth)| (found - truth).abs() < 1e-5), "{values:?}");
-    }
-
-    #[test]
-    fn a_model_that_turns_with_its_size_is_found_far_from_its_straight_line() {
-        // Three whole turns at the size hidden: a straight line from 0 shows nothing of it.
-        let wave = Wave::new(3.0, vec![5.0], 1);
-        let (places, residual) = wave.nearest(&[0.7, 0.71, 5.0]);
-        assert!(places.len() <= NEAREST);
-        // Beside the truth lie local optima a turn farther in or out; the first must be the truth itself.
-        assert!(left(&places[0], &residual) < 1e-2, "{}", left(&places[0], &residual));
-        assert!(places.windows(2).all(|pair| left(&pair[0], &residual) <= left(&pair[1], &residual)));
-    }
-
-    #[test]
-    fn a_shape_between_the_points_of_its_grid_is_found() {
-        // A whole step of the grid turns the end of the rows three times; a tenth of it keeps the phase within a third.
-        let wave = Wave::new(0.0, (2..=10).map(f64::from).collect(), 10);
-        let (places, residual) = wave.nearest(&[0.3, 0.4, 5.37]);
-        assert!(left(&places[0], &residual) < 1e-6, "{}", left(&places[0], &residual));
-        assert!((places[0].setting.values[2] - 5.37).abs() < 1e-3, "{:?}", places[0].setting.values);
-    }
-}
+mod tests;

@@ -119,35 +119,27 @@ impl Effort {
         }
     }
 
-    /// Where every prediction is a simulation: fewer sets.
+    /// Where every prediction is a simulation: fewer sets. Every single cause is looked for wherever it would be if it were
+    /// asked for alone: a tool that is pushed off looks worse from the base than many that mimic it, and from one frequency a
+    /// second mode is not found that swings at another.
     pub fn dear(most_causes: usize) -> Self {
         Self {
             most_causes,
             leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
-            of_each_size: [0, 4, 3, 1],
+            of_each_size: [0, usize::MAX, 3, 1],
             rounds: 3,
             late_leaders: 2,
             nonlinear: true,
-            other_optima: OtherOptima::OfLeader,
+            other_optima: OtherOptima::OfAll,
             level: LEVEL,
             in_fold: false,
         }
     }
 
-    /// Where a simulation is short: every single cause is looked for wherever it would be if it were asked for alone. From one
-    /// place a second mode was not found that alone has the most evidence.
-    pub fn short(most_causes: usize) -> Self {
-        Self { of_each_size: [0, usize::MAX, 3, 1], other_optima: OtherOptima::OfAll, ..Self::dear(most_causes) }
-    }
-
-    /// Where every prediction is a simulation, and that a long one or not; else the whole search.
-    pub(super) fn of(most_causes: usize, is_dear: bool, is_short: bool) -> Self {
-        match (is_dear, is_short) {
-            (false, _) => Self::full(most_causes),
-            (true, true) => Self::short(most_causes),
-            (true, false) => Self::dear(most_causes),
-        }
+    /// Where every prediction is a simulation, or else the whole search.
+    pub(super) fn of(most_causes: usize, is_dear: bool) -> Self {
+        if is_dear { Self::dear(most_causes) } else { Self::full(most_causes) }
     }
 
     /// The same in a fold.
@@ -247,6 +239,7 @@ impl<'a> Weighing<'a> {
             value: &data.value,
             keep: &keep,
             likelihood: &linear.likelihood,
+            misfit_of_base: linear.likelihood.misfit(&linear.residual),
             nonlinear: effort.nonlinear,
             monitor,
         };
@@ -422,6 +415,7 @@ impl<'a> Weighing<'a> {
             value: &self.foundation.data.value,
             keep: &self.keep,
             likelihood: &self.linear.likelihood,
+            misfit_of_base: self.linear.likelihood.misfit(&self.linear.residual),
             nonlinear: dear,
             monitor,
         };

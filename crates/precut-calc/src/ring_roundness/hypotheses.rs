@@ -27,10 +27,10 @@ const RATIO: Shape = Shape { mean: 7.0, sd: 3.0, logarithmic: false };
 /// Amplitudes of a wave of the blank about which it is linearised, prior standard deviations, and at how many phases.
 const WAVES: &[(f64, u32)] = &[(0.15, 6), (0.4, 8), (0.8, 12), (1.4, 16)];
 /// The same of a roller that runs out.
-const RUNOUTS: &[(f64, u32)] = &[(0.5, 6), (1.2, 8), (2.2, 12), (3.5, 16)];
-/// Parts of a step of the ratio where it is looked for: some hundredths more already beat otherwise from revolution to
-/// revolution.
-const RATIO_PARTS: u32 = 10;
+const RUNOUTS: &[(f64, u32)] = &[(0.5, 6), (1.2, 8), (2.2, 10), (3.5, 12)];
+/// Parts of a step of the ratio where it is looked for: a wave that comes back alike in every turn is seen within a hundredth or two of its
+/// ratio, and as another one beyond.
+const RATIO_PARTS: u32 = 25;
 /// How many of them, where the model comes nearest to the rows.
 const WAVES_TRIED: usize = 8;
 
