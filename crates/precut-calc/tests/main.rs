@@ -95,6 +95,7 @@ mod path_chords;
 mod process_figures;
 mod process_gain;
 mod process_loop;
+mod process_names;
 mod process_stored;
 mod process_streams;
 mod process_support;
