@@ -96,6 +96,7 @@ mod path_chords;
 mod process_figures;
 mod process_gain;
 mod process_loop;
+mod process_names;
 mod process_snapshot;
 mod process_stored;
 mod process_streams;

@@ -1,7 +1,7 @@
 //! A process under watch that cuts what it is told: with nothing hidden it chases no noise, and after a change its parts are good again.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use crate::process_support::{Shop, draws};
+use crate::process_support::{Shop, draws, first_seed};
 use precut_calc::calculator::{Unwatched, Watched};
 use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionRun};
 use precut_calc::effects::DeflectionEffect;
@@ -42,9 +42,22 @@ fn rms(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
+/// How a path is cut into moves: as it is by default, or so fine that its corners and rounding do not count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Moves {
+    Default,
+    Fine,
+}
+
 /// So many parts on the base job's path, each cut as the controller says after the one before.
-fn cut(controller: Controller, hidden: &Hidden, seed: u64, count: u32) -> Cut {
+fn cut(controller: Controller, hidden: &Hidden, moves: Moves, seed: u64, count: u32) -> Cut {
     let mut shop = Shop::new(seed);
+    if moves == Moves::Fine {
+        let fine = json!({ "chord_tolerance_um": 0.05, "increment_um": 0.01 });
+        for of in shop.document.part_types.values_mut() {
+            of.job.path = serde_json::from_value(fine.clone()).unwrap();
+        }
+    }
     let job = shop.document.part_types["A"].job.clone();
     let start = shop.template.conditions.clone();
     let mut run = DeflectionCompensation::compensated(&job, &start, &Unwatched).unwrap().unwrap();
@@ -135,9 +148,10 @@ fn a_process_in_control_is_left_alone() {
     let length = if is_measured { 200 } else { 80 };
     let (mut ours, mut fixed, mut most) = (Vec::new(), Vec::new(), 0);
     for seed in 0..count {
-        let own = cut(Controller::Ours, &Hidden::Nothing, 800 + seed, length);
+        let own = cut(Controller::Ours, &Hidden::Nothing, Moves::Default, 800 + seed, length);
         ours.extend(own.forms.iter().map(|form| form * form));
-        fixed.extend(cut(Controller::Fixed, &Hidden::Nothing, 800 + seed, length).forms.iter().map(|form| form * form));
+        let other = cut(Controller::Fixed, &Hidden::Nothing, Moves::Default, 800 + seed, length);
+        fixed.extend(other.forms.iter().map(|form| form * form));
         most = most.max(own.paths);
     }
     let excess = rms(&ours) / rms(&fixed) - 1.0;
@@ -168,12 +182,16 @@ fn after_a_change_parts_are_good_again() {
         (vec![Controller::Fixed, Controller::Ours], &changes[..1])
     };
     let first = CHANGED as usize - 1;
-    for (name, changes) in [("change", changes), ("gauge", &gauge)] {
+    let moves: &[Moves] = if is_measured { &[Moves::Default, Moves::Fine] } else { &[Moves::Default] };
+    let first_of = first_seed() + 900;
+    for (name, changes, moves) in
+        moves.iter().flat_map(|moves| [("change", changes, *moves), ("gauge", &gauge[..], *moves)])
+    {
         let mut after = Vec::new();
         for &controller in &controllers {
             let (mut spans, mut paths) = ([Vec::new(), Vec::new(), Vec::new()], 0);
             for (hidden, seed) in changes.iter().flat_map(|own| (0..count).map(move |seed| (own, seed))) {
-                let own = cut(controller, hidden, 900 + seed, 120);
+                let own = cut(controller, hidden, moves, first_of + seed, 120);
                 let ranges = [20..first, first..first + 10, first + 10..120];
                 spans.iter_mut().zip(ranges).for_each(|(span, range)| span.extend_from_slice(&own.squares[range]));
                 paths += own.paths;
@@ -181,7 +199,7 @@ fn after_a_change_parts_are_good_again() {
             let [before, ten, then] = spans.map(|span| rms(&span));
             if is_measured {
                 let each = paths as f64 / (changes.len() as f64 * count as f64);
-                eprintln!("{name}: | {controller:?} | {before:.2} | {ten:.2} | {then:.2} | {each:.1} |");
+                eprintln!("{name}, {moves:?}: | {controller:?} | {before:.2} | {ten:.2} | {then:.2} | {each:.1} |");
             }
             after.push(then);
         }

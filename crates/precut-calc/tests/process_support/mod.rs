@@ -1,6 +1,7 @@
 //! Streams of parts with a known truth.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+pub(crate) mod knowing;
 pub(crate) mod series;
 
 use precut_calc::calculator::{Calculator, ForwardModel, Rows, Unwatched};
@@ -120,4 +121,9 @@ pub(crate) fn on_path(job: &Job, run: &DeflectionRun) -> DeflectionRun {
 pub(crate) fn draws(variable: &str, few: u64) -> (u64, bool) {
     let wanted = std::env::var(variable).ok().and_then(|count| count.parse().ok());
     (wanted.unwrap_or(few), wanted.is_some())
+}
+
+/// Where the seeds of series begin; `PRECUT_PROCESS_SEED` takes others: what was chosen on some has to hold on others.
+pub(crate) fn first_seed() -> u64 {
+    draws("PRECUT_PROCESS_SEED", 0).0 * 100_000_000
 }

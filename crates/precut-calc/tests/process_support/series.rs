@@ -94,7 +94,7 @@ impl Hidden {
         }
     }
 
-    fn both_signs(self) -> bool {
+    pub(crate) fn both_signs(self) -> bool {
         matches!(self, Self::TailstockOffset | Self::Force | Self::Gauge | Self::Distortion)
     }
 }
@@ -128,6 +128,10 @@ pub(crate) struct Series {
     /// Of every part the mean of its rows where nothing changed, and its covariance.
     pub(crate) mean: Vec<DVector<f64>>,
     pub(crate) covariance: Vec<DMatrix<f64>>,
+    /// What its change does to every part in which it acts; nothing where nothing changes.
+    pub(crate) shift: Vec<DVector<f64>>,
+    /// Where each row stands along its part, 0 to 1.
+    pub(crate) share: Vec<Vec<f64>>,
 }
 
 /// Predictions of one type.
@@ -240,11 +244,15 @@ impl Series {
             }
             part
         });
-        let parts = parts.collect();
+        let parts: Vec<Part> = parts.collect();
         let all = 0..recipe.count as usize;
+        let shift = moved.map_or_else(Vec::new, |(shift, _)| all.clone().map(|n| shift[place(n)][n].clone()).collect());
+        let length_mm = |part: &Part| document.part_types[&part.part_type].job.shaft.length_mm();
+        let share_of = |part: &Part| part.measurements.iter().map(|row| row.z_mm / length_mm(part)).collect();
+        let share = parts.iter().map(share_of).collect();
         let mean = all.clone().map(|n| of_types[place(n)].mean[n].clone()).collect();
         let covariance = all.map(|n| of_types[place(n)].covariance[n].clone()).collect();
-        Self { document, parts, mean, covariance }
+        Self { document, parts, mean, covariance, shift, share }
     }
 }
 
