@@ -275,7 +275,7 @@ impl Diagnosable for RingRoundness {
     type Row = RingMeasurement;
 
     /// Most of them the search for the places of waves and for the ratio of a roller, which is made of rough ones: 17,000 of
-    /// 240 nodes where no straight line leads there. Trials take 0.5 to 1.4 times this (measured).
+    /// 240 nodes where no straight line leads there. Trials take 0.4 to 1.4 times this (measured).
     const PREDICTIONS: f64 = 1400.0;
 
     const DIAGNOSES: &'static [Example] = &[Example {
