@@ -19,6 +19,8 @@ use super::{normal_below, normal_quantile};
 const SCRAMBLINGS: usize = 8;
 /// Lines of a scrambling at first: of the near model, and of the real one.
 const FIRST_LINES: [usize; 2] = [8, 2];
+/// The same of a model that is asked at two places of each line.
+const FIRST_SAMPLED: usize = 4;
 /// Largest error, of the probability and relative to the smaller of it and its complement.
 const LARGEST_ERROR: [f64; 2] = [0.002, 0.1];
 /// Share of the error that the near model may take of itself.
@@ -233,6 +235,89 @@ impl<const N: usize> Sketch<N> {
             }
         }
         Ok(sums.map(|sum| sum / self.lines.len().max(1) as f64))
+    }
+}
+
+/// A model that costs much, asked at two places of every line: along the line it is the near model and what the real one is off it there,
+/// straight between the two places and no further beyond them (`certainty/7.1`).
+pub(crate) struct Sampled {
+    frame: Frame,
+    /// Where each line of every scrambling crosses the plane, and what the real margin is off there.
+    lines: [Vec<(Vec<f64>, [f64; 2])>; SCRAMBLINGS],
+}
+
+/// Places of a line at which the real model is asked.
+const ASKED: f64 = 1.0;
+
+/// Margins of the real model at many points at once.
+pub(crate) type Real<'a> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<f64>, Failure> + 'a;
+
+impl Sampled {
+    /// Lines along `axis`, twice as many until the margin is kept with a probability that is known to `enough`.
+    pub(crate) fn until(
+        enough: f64,
+        (axis, effort): (&[f64], Effort),
+        near: &dyn Fn(&[f64]) -> f64,
+        real: &mut Real<'_>,
+    ) -> Result<Self, Failure> {
+        let mut sampled = Self { frame: Frame::along(axis), lines: std::array::from_fn(|_| Vec::new()) };
+        let mut count = FIRST_SAMPLED.min(effort.most_lines);
+        loop {
+            sampled.extend(count, effort, near, real)?;
+            if sampled.kept(0.0, near)?.error <= enough || count >= effort.most_lines {
+                return Ok(sampled);
+            }
+            count = (2 * count).min(effort.most_lines);
+        }
+    }
+
+    fn extend(
+        &mut self,
+        count: usize,
+        effort: Effort,
+        near: &dyn Fn(&[f64]) -> f64,
+        real: &mut Real<'_>,
+    ) -> Result<(), Failure> {
+        let mut starts = Vec::new();
+        for (scrambling, lines) in self.lines.iter().enumerate() {
+            let more = lines.len()..count;
+            starts.extend(more.map(|index| (scrambling, self.frame.across(index, effort.scrambled(scrambling)))));
+        }
+        let points: Vec<Vec<f64>> =
+            starts.iter().flat_map(|(_, start)| [-ASKED, ASKED].map(|place| self.frame.at(start, place))).collect();
+        let margins = real(&points)?;
+        let off: Vec<f64> = margins.iter().zip(&points).map(|(margin, point)| margin - near(point)).collect();
+        for ((scrambling, start), pair) in starts.into_iter().zip(off.chunks_exact(2)) {
+            self.lines[scrambling].push((start, [pair[0], pair[1]]));
+        }
+        Ok(())
+    }
+
+    /// The probability that the margin is kept where it has to be above `least`.
+    pub(crate) fn kept(&self, least: f64, near: &dyn Fn(&[f64]) -> f64) -> Result<Estimate, Failure> {
+        let mut means = [0.0; SCRAMBLINGS];
+        for (mean, lines) in means.iter_mut().zip(&self.lines) {
+            for (start, off) in lines {
+                let line = Line::scanned(&mut |place| {
+                    let share = 0.5 + 0.5 * (place / ASKED).clamp(-1.0, 1.0);
+                    Ok([near(&self.frame.at(start, place)) + off[0] + share * (off[1] - off[0]) - least])
+                })?;
+                *mean += line.probability(0..=0) / lines.len() as f64;
+            }
+        }
+        Ok(Estimate::of(means))
+    }
+
+    /// How often the real model was asked.
+    pub(crate) fn asked(&self) -> usize {
+        2 * self.lines.iter().map(Vec::len).sum::<usize>()
+    }
+
+    /// Variance of what the real margin is off the near one.
+    pub(crate) fn variance_off(&self) -> f64 {
+        let off: Vec<f64> = self.lines.iter().flatten().flat_map(|(_, off)| *off).collect();
+        let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
+        off.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64
     }
 }
 
