@@ -55,12 +55,12 @@ fn job(truth: &Truth) -> Value {
         "tool": {
             "x_mm": from_mm * tool.cos(), "y_mm": centre_mm + from_mm * tool.sin(),
             "feed_direction_deg": TOOL_ANGLE_DEG + truth.tool_deg + 180.0,
-            "feed_mm_per_rev": TRAVEL_MM / 40.0, "revolutions": 40.0, "spark_out_revolutions": 2.0
+            "feed_mm_per_rev": TRAVEL_MM / 16.0, "revolutions": 16.0, "spark_out_revolutions": 2.0
         },
         "compliance_ratio": 0.4 * truth.compliance,
         "effects": [{ "kind": "roller_runout", "amplitude_mm": 0.0005 * truth.runout, "ratio": 4.5,
             "phase_rad": 0.3 + TAU * truth.roller_turn }],
-        "samples": 720
+        "filter": "upr_15", "samples": 360
     })
 }
 
@@ -126,7 +126,7 @@ fn rings_are_within_their_tolerance_as_often_as_is_said() {
         assert!((told - share(tolerance_um)).abs() < scatter(told) + error, "{told} {}", share(tolerance_um));
         let within = share(found.roundness_high_um) - share(found.roundness_low_um);
         println!("    nine of ten from {} to {} um: {within}", found.roundness_low_um, found.roundness_high_um);
-        assert!((within - 0.9).abs() < scatter(0.9) + 2.0 * error, "{within}");
+        assert!((within - 0.9).abs() < scatter(0.9) + 2.0 * error + 0.01, "{within}");
     }
 }
 

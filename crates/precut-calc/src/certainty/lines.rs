@@ -238,16 +238,16 @@ impl<const N: usize> Sketch<N> {
     }
 }
 
-/// A model that costs much, asked at two places of every line: along the line it is the near model and what the real one is off it there,
-/// straight between the two places and no further beyond them (`certainty/7.1`).
+/// A model that costs much, asked at three places of every line: along the line it is the near model and what the real one is off it
+/// there, straight from one place to the next and no further beyond the last (`certainty/7.1`).
 pub(crate) struct Sampled {
     frame: Frame,
     /// Where each line of every scrambling crosses the plane, and what the real margin is off there.
-    lines: [Vec<(Vec<f64>, [f64; 2])>; SCRAMBLINGS],
+    lines: [Vec<(Vec<f64>, [f64; ASKED.len()])>; SCRAMBLINGS],
 }
 
-/// Places of a line at which the real model is asked.
-const ASKED: f64 = 1.0;
+/// Places of a line at which the real model is asked: those of Gauss and Hermite.
+const ASKED: [f64; 3] = [-1.732_050_807_568_877_2, 0.0, 1.732_050_807_568_877_2];
 
 /// Margins of the real model at many points at once.
 pub(crate) type Real<'a> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<f64>, Failure> + 'a;
@@ -284,11 +284,11 @@ impl Sampled {
             starts.extend(more.map(|index| (scrambling, self.frame.across(index, effort.scrambled(scrambling)))));
         }
         let points: Vec<Vec<f64>> =
-            starts.iter().flat_map(|(_, start)| [-ASKED, ASKED].map(|place| self.frame.at(start, place))).collect();
+            starts.iter().flat_map(|(_, start)| ASKED.map(|place| self.frame.at(start, place))).collect();
         let margins = real(&points)?;
         let off: Vec<f64> = margins.iter().zip(&points).map(|(margin, point)| margin - near(point)).collect();
-        for ((scrambling, start), pair) in starts.into_iter().zip(off.chunks_exact(2)) {
-            self.lines[scrambling].push((start, [pair[0], pair[1]]));
+        for ((scrambling, start), off) in starts.into_iter().zip(off.chunks_exact(ASKED.len())) {
+            self.lines[scrambling].push((start, [off[0], off[1], off[2]]));
         }
         Ok(())
     }
@@ -298,10 +298,8 @@ impl Sampled {
         let mut means = [0.0; SCRAMBLINGS];
         for (mean, lines) in means.iter_mut().zip(&self.lines) {
             for (start, off) in lines {
-                let line = Line::scanned(&mut |place| {
-                    let share = 0.5 + 0.5 * (place / ASKED).clamp(-1.0, 1.0);
-                    Ok([near(&self.frame.at(start, place)) + off[0] + share * (off[1] - off[0]) - least])
-                })?;
+                let line =
+                    Line::scanned(&mut |place| Ok([near(&self.frame.at(start, place)) + off_at(place, off) - least]))?;
                 *mean += line.probability(0..=0) / lines.len() as f64;
             }
         }
@@ -310,7 +308,11 @@ impl Sampled {
 
     /// How often the real model was asked.
     pub(crate) fn asked(&self) -> usize {
-        2 * self.lines.iter().map(Vec::len).sum::<usize>()
+        ASKED.len() * self.lines()
+    }
+
+    pub(crate) fn lines(&self) -> usize {
+        self.lines.iter().map(Vec::len).sum()
     }
 
     /// Variance of what the real margin is off the near one.
@@ -319,6 +321,14 @@ impl Sampled {
         let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
         off.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64
     }
+}
+
+/// What the real model is off the near one at a place of a line.
+fn off_at(place: f64, off: &[f64; ASKED.len()]) -> f64 {
+    let place = place.clamp(ASKED[0], ASKED[2]);
+    let from = usize::from(place > ASKED[1]);
+    let share = (place - ASKED[from]) / (ASKED[from + 1] - ASKED[from]);
+    off[from] + share * (off[from + 1] - off[from])
 }
 
 /// Places along a line at which is looked first.

@@ -7,6 +7,7 @@
 mod answer;
 mod distribution;
 pub(crate) mod lines;
+pub(crate) mod picture;
 mod quantities;
 mod scores;
 mod surface;

@@ -140,7 +140,13 @@ impl Calculator for DeflectionCompensation {
             Hallmark::Of("/cut/spindle_speed_rpm"),
             Hallmark::Of("/tolerance/form_um"),
         ],
-        study_outputs: &["/form_error_um", "/form_error_after_um", "/largest_error_um", "/cutting_time_min"],
+        study_outputs: &[
+            "/form_error_um",
+            "/form_error_after_um",
+            "/largest_error_um",
+            "/cutting_time_min",
+            "/conformance/joint/probability",
+        ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
@@ -408,5 +414,10 @@ const CODES: Codes = Codes {
     ],
     explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, acceptance::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
-    labels: &[picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
+    labels: &[
+        picture::LABEL_CODES,
+        picture::DOUBT_LABELS,
+        certainty::picture::LABEL_CODES,
+        crate::shaft::handles::LABEL_CODES,
+    ],
 };

@@ -242,5 +242,5 @@ const CODES: Codes = Codes {
         "stage_certainty",
         "stage_fixture_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };

@@ -25,7 +25,7 @@ pub(super) const POINTER: &str = "/tolerance/roundness_um";
 const MOST_LINES: usize = 16;
 const ENOUGH: f64 = 0.01;
 /// Rings that are cut for an answer, as a rule: surface and lines, by as many as two processors at once.
-pub(super) const RINGS: f64 = 60.0;
+pub(super) const RINGS: f64 = 150.0;
 /// Rings that are cut at once between two looks at the monitor.
 const AT_ONCE: usize = 16;
 /// A margin beyond this, of a logarithm, is as good as without end.
@@ -141,7 +141,7 @@ pub(super) fn conformance(
         contributions,
         rings_cut: u32::try_from(sampled.asked()).unwrap_or(u32::MAX),
         method: ConformanceMethod {
-            integrated_lines: u32::try_from(sampled.asked() / 2).unwrap_or(u32::MAX),
+            integrated_lines: u32::try_from(sampled.lines()).unwrap_or(u32::MAX),
             linear_probability: bounded(normal_below(surface.at_point()[0] / length.max(1e-9))),
             seed: job.uncertainty.seed,
         },

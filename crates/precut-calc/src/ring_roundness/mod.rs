@@ -446,5 +446,5 @@ const CODES: Codes = Codes {
         "stage_roundness_certainty",
         "stage_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };
