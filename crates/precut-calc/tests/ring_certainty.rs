@@ -116,7 +116,7 @@ fn rings_are_within_their_tolerance_as_often_as_is_said() {
         let (told, error) = (found.joint.probability, found.joint.numerical_error);
         println!(
             "{tolerance_um:.3} um: told {told:.3} +- {error:.3} (linear {:.3}), good {:.3} of {count}, {} rings cut",
-            found.method.linear_probability,
+            found.linear_probability,
             share(tolerance_um),
             found.rings_cut
         );

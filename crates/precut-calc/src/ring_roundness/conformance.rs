@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, checkpoint};
-use crate::certainty::lines::{Effort, Estimate, Sampled};
+use crate::certainty::lines::{Effort, Estimate, Question, Sampled};
 use crate::certainty::{
-    ConformanceMethod, Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties,
-    WidthUnit, bounded, normal_below,
+    Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties, WidthUnit, bounded,
+    normal_below,
 };
 
 use super::causes::nodes;
@@ -21,11 +21,13 @@ use super::uncertain::{PHASES, RingQuantity, drawn, uncertainties};
 
 /// The field that sets the limit.
 pub(super) const POINTER: &str = "/tolerance/roundness_um";
-/// Most lines of one scrambling, and the error of the probability below which there are no more.
-const MOST_LINES: usize = 16;
+/// Most lines of one scrambling, of the response surface.
+const MOST_LINES: usize = 64;
+/// Most rings of one scrambling, and the error of the probability below which there are no more.
+const MOST_RINGS: usize = 32;
 const ENOUGH: f64 = 0.01;
-/// Rings that are cut for an answer, as a rule: surface and lines, by as many as two processors at once.
-pub(super) const RINGS: f64 = 150.0;
+/// Rings that are cut one after the other for an answer, as a rule: those of the surface, and half of all others.
+pub(super) const RINGS: f64 = 130.0;
 /// Rings that are cut at once between two looks at the monitor.
 const AT_ONCE: usize = 16;
 /// A margin beyond this, of a logarithm, is as good as without end.
@@ -70,8 +72,9 @@ pub struct RingConformance {
     /// Rings that were cut for it.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rings_cut: u32,
-    /// How the numbers were found.
-    pub method: ConformanceMethod,
+    /// Joint probability of the model that is linear about the stated values.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub linear_probability: f64,
 }
 
 /// The setting of a ring, judged by its roundness.
@@ -112,15 +115,19 @@ pub(super) fn conformance(
         .collect();
     let axis: Vec<f64> = slopes.iter().copied().chain([0.0; PHASES]).collect();
     let effort = Effort { seed: job.uncertainty.seed, most_lines: MOST_LINES };
-    let mut real = |points: &[Vec<f64>]| judged.margins(points);
-    let sampled = Sampled::until(ENOUGH, (&axis, effort), &|g| near(&judged.of, g), &mut real)?;
-    let found = sampled.kept(0.0, &|g| near(&judged.of, g))?;
-    let below = |um: f64| Ok(sampled.kept((limit_um / um).ln(), &|g| near(&judged.of, g))?.probability);
-    let off = sampled.variance_off();
-    let halved = |index: usize| {
-        let halved = judged.of.halved(index);
-        sampled.kept(0.0, &|g| near(&halved, g)).map(|found| bounded(found.probability))
+    let by_surface = |of: &Uncertainties<RingQuantity>, least: f64| -> Result<f64, Failure> {
+        let question = Question { axis: &axis, sets: [0..=0], effort, monitor: share.monitor };
+        Ok(question.of(&mut |g: &[f64]| Ok([near(of, g) - least]))?.of[0].probability)
     };
+    let own = |g: &[f64]| near(&judged.of, g);
+    let nearly = |least: f64| by_surface(&judged.of, least);
+    let mut real = |points: &[Vec<f64>]| judged.margins(points);
+    let sampled = Sampled::until((ENOUGH, MOST_RINGS), (axis.len(), effort), (&own, &nearly), &mut real)?;
+    let found = sampled.kept(0.0, &own, &nearly)?;
+    let below = |um: f64| Ok(sampled.kept((limit_um / um).ln(), &own, &nearly)?.probability);
+    let off = sampled.variance_off(&own);
+    let now = nearly(0.0)?;
+    let halved = |index: usize| Ok(bounded(found.probability + by_surface(&judged.of.halved(index), 0.0)? - now));
     let contributions = judged.contributions(&slopes, off, halved)?;
     let is_common = |one: &&Contribution| one.level == Level::Setup;
     let length = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
@@ -140,11 +147,7 @@ pub(super) fn conformance(
         share_common_to_all: contributions.iter().filter(is_common).filter_map(|one| one.share_of_variance).sum(),
         contributions,
         rings_cut: u32::try_from(sampled.asked()).unwrap_or(u32::MAX),
-        method: ConformanceMethod {
-            integrated_lines: u32::try_from(sampled.lines()).unwrap_or(u32::MAX),
-            linear_probability: bounded(normal_below(surface.at_point()[0] / length.max(1e-9))),
-            seed: job.uncertainty.seed,
-        },
+        linear_probability: bounded(normal_below(surface.at_point()[0] / length.max(1e-9))),
     })
 }
 
