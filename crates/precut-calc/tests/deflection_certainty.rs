@@ -118,6 +118,47 @@ fn below(x: f64) -> f64 {
     0.5 * statrs::function::erf::erfc(-x / std::f64::consts::SQRT_2)
 }
 
+/// Normal errors, read with a normal error: what is accepted within limits that lie by 1.65 standard uncertainties inside, by
+/// summing over the true error.
+#[test]
+fn what_is_accepted_has_the_closed_form() {
+    let (own_um, gauge_um, half_um) = (5.0, 2.0, 10.0);
+    let quantities = json!([{ "quantity": "spindle_scatter", "distribution": { "kind": "normal", "standard_uncertainty_um": own_um } }]);
+    let mut job = job(&quantities, &json!({ "diameter_um": 2.0 * half_um }));
+    job["uncertainty"]["measurement"] = json!({ "standard_uncertainty_um": gauge_um });
+    let answer = solved(&job);
+    let limit_um = half_um - 1.65 * gauge_um;
+    assert!((number(&answer, "/conformance/acceptance/upper_um") - limit_um).abs() < 1e-12);
+    assert!((number(&answer, "/conformance/acceptance/lower_um") + limit_um).abs() < 1e-12);
+    let (steps, reach) = (20_000, 8.0);
+    let (mut accepted, mut good_and_accepted) = (0.0, 0.0);
+    for step in 0..steps {
+        let score = reach * (2.0 * (f64::from(step) + 0.5) / f64::from(steps) - 1.0);
+        let weight =
+            (-0.5 * score * score).exp() / (2.0 * std::f64::consts::PI).sqrt() * 2.0 * reach / f64::from(steps);
+        let error_um = own_um * score;
+        let read = below((limit_um - error_um) / gauge_um) - below((-limit_um - error_um) / gauge_um);
+        accepted += weight * read;
+        good_and_accepted += if error_um.abs() <= half_um { weight * read } else { 0.0 };
+    }
+    let good = 1.0 - 2.0 * below(-half_um / own_um);
+    let error = number(&answer, "/conformance/acceptance/numerical_error");
+    for (name, exact, relative) in [
+        ("accepted", accepted, 0.0),
+        ("bad_among_accepted", 1.0 - good_and_accepted / accepted, 0.1),
+        ("good_and_rejected", good - good_and_accepted, 0.0),
+    ] {
+        let found = number(&answer, &format!("/conformance/acceptance/{name}"));
+        assert!((found - exact).abs() < error.max(1e-3) + relative * exact, "{name}: {found} {exact}");
+        assert!(relative <= 0.0 || (found - exact).abs() < 2e-4, "{name}: {found} {exact}");
+    }
+    // A gauge that leaves nothing to accept.
+    job["uncertainty"]["measurement"] = json!({ "standard_uncertainty_um": half_um });
+    let answer = DeflectionCompensation::run(&prepared(job), &Unwatched).unwrap();
+    assert!(answer.output.conformance.unwrap().acceptance.is_none());
+    assert!(answer.warnings.iter().any(|warning| warning.code == "gauge_too_uncertain"));
+}
+
 #[test]
 fn a_wider_tolerance_and_a_smaller_width_never_lower_the_probability() {
     let quantities = |percent: f64| {

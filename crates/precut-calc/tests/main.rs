@@ -114,6 +114,7 @@ mod program_stock;
 mod program_yielding;
 mod receptance_fit;
 mod ring_cases;
+mod ring_certainty;
 mod ring_clamping;
 mod ring_contract;
 mod ring_dynamics;

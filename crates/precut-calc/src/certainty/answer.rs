@@ -19,8 +19,41 @@ pub struct Conformance {
     /// What would raise the probability, the largest gain first; each was computed. Nothing is listed that gains less than
     /// its error.
     pub advice: Vec<Improvement>,
+    /// Which readings to accept; null where the job says nothing of the measurement, without limits of size, and where these leave no
+    /// reading that can be accepted.
+    pub acceptance: Option<Acceptance>,
     /// How the numbers were found.
     pub method: ConformanceMethod,
+}
+
+/// Which readings to accept, by the guard band of ISO 14253-1:2017, and what that risks (JCGM 106:2012).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Acceptance {
+    /// Standard uncertainty of a reading.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub measuring_uncertainty_um: f64,
+    /// By how much the limits of acceptance lie within those of size: 1.65 times that, so that a part that is just out of them is
+    /// accepted with 5 %.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub guard_band_um: f64,
+    /// Largest deviation that is accepted; null where there is no upper limit.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub upper_um: Option<f64>,
+    /// Smallest deviation that is accepted; null where there is no lower limit.
+    #[schema(extensions(("x-unit" = json!("um"))))]
+    pub lower_um: Option<f64>,
+    /// Probability that a part is accepted.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub accepted: f64,
+    /// Share of the accepted parts that are really out of their limits of size: the consumer's risk.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub bad_among_accepted: f64,
+    /// Probability that a part is within its limits of size and is rejected: the producer's risk.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub good_and_rejected: f64,
+    /// Twice the standard error of the probability that a part is good and accepted.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub numerical_error: f64,
 }
 
 /// The probability that a limit is kept.

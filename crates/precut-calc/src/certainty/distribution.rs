@@ -30,6 +30,10 @@ pub enum Distribution {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(minimum = 0.0, maximum = 100_000.0, example = 3.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("u"))))]
         standard_uncertainty_um: Option<f64>,
+        /// Standard uncertainty of an angle.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 10.0, example = 0.1, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("u"))))]
+        standard_uncertainty_deg: Option<f64>,
     },
     /// A factor whose logarithm is normal; the stated value is its median.
     Lognormal {
@@ -47,6 +51,10 @@ pub enum Distribution {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(minimum = 0.0, maximum = 100_000.0, example = 60.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("w"))))]
         half_width_um: Option<f64>,
+        /// Half of the width of an angle.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("w"))))]
+        half_width_deg: Option<f64>,
     },
     /// The same, likelier toward the middle.
     Triangular {
@@ -58,6 +66,10 @@ pub enum Distribution {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(minimum = 0.0, maximum = 100_000.0, example = 60.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("w"))))]
         half_width_um: Option<f64>,
+        /// Half of the width of an angle.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("w"))))]
+        half_width_deg: Option<f64>,
     },
     /// Student's, as few measured values give it.
     StudentT {
@@ -99,6 +111,8 @@ pub(crate) enum WidthUnit {
     Percent,
     /// An addition.
     Um,
+    /// An angle.
+    Deg,
 }
 
 impl WidthUnit {
@@ -106,6 +120,7 @@ impl WidthUnit {
         match self {
             Self::Percent => "percent",
             Self::Um => "um",
+            Self::Deg => "deg",
         }
     }
 }
@@ -113,24 +128,47 @@ impl WidthUnit {
 impl Distribution {
     /// A normal factor.
     pub(crate) const fn normal_percent(percent: f64) -> Self {
-        Self::Normal { standard_uncertainty_percent: Some(percent), standard_uncertainty_um: None }
+        Self::Normal {
+            standard_uncertainty_percent: Some(percent),
+            standard_uncertainty_um: None,
+            standard_uncertainty_deg: None,
+        }
     }
 
     /// A normal addition.
     pub(crate) const fn normal_um(um: f64) -> Self {
-        Self::Normal { standard_uncertainty_percent: None, standard_uncertainty_um: Some(um) }
+        Self::Normal {
+            standard_uncertainty_percent: None,
+            standard_uncertainty_um: Some(um),
+            standard_uncertainty_deg: None,
+        }
+    }
+
+    /// A normal error of an angle.
+    pub(crate) const fn normal_deg(deg: f64) -> Self {
+        Self::Normal {
+            standard_uncertainty_percent: None,
+            standard_uncertainty_um: None,
+            standard_uncertainty_deg: Some(deg),
+        }
     }
 
     /// Finds what cannot be for a quantity whose width is given in `unit`.
     pub(crate) fn check(&self, unit: WidthUnit, pointer: &str, violations: &mut Violations) {
-        let of = |percent: Option<f64>, um: Option<f64>| match unit {
-            WidthUnit::Percent => percent.is_some() && um.is_none(),
-            WidthUnit::Um => um.is_some() && percent.is_none(),
+        let of = |percent: Option<f64>, um: Option<f64>, deg: Option<f64>| {
+            let stated = [(WidthUnit::Percent, percent), (WidthUnit::Um, um), (WidthUnit::Deg, deg)];
+            stated.iter().all(|(of, width)| width.is_some() == (*of == unit))
         };
         let fits = match *self {
-            Self::Normal { standard_uncertainty_percent: percent, standard_uncertainty_um: um }
-            | Self::Uniform { half_width_percent: percent, half_width_um: um }
-            | Self::Triangular { half_width_percent: percent, half_width_um: um } => of(percent, um),
+            Self::Normal {
+                standard_uncertainty_percent: percent,
+                standard_uncertainty_um: um,
+                standard_uncertainty_deg: deg,
+            }
+            | Self::Uniform { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
+            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
+                of(percent, um, deg)
+            }
             Self::Lognormal { .. } => unit == WidthUnit::Percent,
             Self::StudentT { .. } => unit == WidthUnit::Um,
         };
@@ -152,13 +190,15 @@ impl Distribution {
                 // No factor is negative; beyond four standard deviations of the widest one.
                 (1.0 + percent / 100.0 * score).max(1e-3)
             }
-            Self::Normal { standard_uncertainty_um, .. } => standard_uncertainty_um.unwrap_or(0.0) * score,
-            Self::Lognormal { log_standard_deviation } => (log_standard_deviation * score).exp(),
-            Self::Uniform { half_width_percent, half_width_um } => {
-                within(half_width_percent, half_width_um, even(score))
+            Self::Normal { standard_uncertainty_um: um, standard_uncertainty_deg: deg, .. } => {
+                um.or(deg).unwrap_or(0.0) * score
             }
-            Self::Triangular { half_width_percent, half_width_um } => {
-                within(half_width_percent, half_width_um, peaked(score))
+            Self::Lognormal { log_standard_deviation } => (log_standard_deviation * score).exp(),
+            Self::Uniform { half_width_percent, half_width_um: um, half_width_deg: deg } => {
+                within(half_width_percent, um.or(deg), even(score))
+            }
+            Self::Triangular { half_width_percent, half_width_um: um, half_width_deg: deg } => {
+                within(half_width_percent, um.or(deg), peaked(score))
             }
             Self::StudentT { standard_uncertainty_um, degrees_of_freedom } => {
                 standard_uncertainty_um * student(score, degrees_of_freedom)
@@ -182,11 +222,16 @@ impl Distribution {
         let half = |width: &mut Option<f64>| *width = width.map(|width| 0.5 * width);
         let mut halved = self.clone();
         match &mut halved {
-            Self::Normal { standard_uncertainty_percent: percent, standard_uncertainty_um: um }
-            | Self::Uniform { half_width_percent: percent, half_width_um: um }
-            | Self::Triangular { half_width_percent: percent, half_width_um: um } => {
+            Self::Normal {
+                standard_uncertainty_percent: percent,
+                standard_uncertainty_um: um,
+                standard_uncertainty_deg: deg,
+            }
+            | Self::Uniform { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
+            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
                 half(percent);
                 half(um);
+                half(deg);
             }
             Self::Lognormal { log_standard_deviation: width }
             | Self::StudentT { standard_uncertainty_um: width, .. } => *width *= 0.5,
@@ -195,10 +240,10 @@ impl Distribution {
     }
 }
 
-fn within(half_width_percent: Option<f64>, half_width_um: Option<f64>, place: f64) -> f64 {
+fn within(half_width_percent: Option<f64>, half_width: Option<f64>, place: f64) -> f64 {
     match half_width_percent {
         Some(percent) => 1.0 + percent / 100.0 * place,
-        None => half_width_um.unwrap_or(0.0) * place,
+        None => half_width.unwrap_or(0.0) * place,
     }
 }
 
@@ -228,10 +273,12 @@ mod tests {
 
     #[test]
     fn shares_below_are_those_of_the_distribution() {
-        let triangular = Distribution::Triangular { half_width_percent: None, half_width_um: Some(2.0) };
+        let triangular =
+            Distribution::Triangular { half_width_percent: None, half_width_um: Some(2.0), half_width_deg: None };
         // Of a triangle over -2 to 2 an eighth lies below -1.
         assert!((triangular.at(super::super::normal_quantile(0.125)) + 1.0).abs() < 1e-9);
-        let uniform = Distribution::Uniform { half_width_percent: Some(20.0), half_width_um: None };
+        let uniform =
+            Distribution::Uniform { half_width_percent: Some(20.0), half_width_um: None, half_width_deg: None };
         assert!((uniform.at(super::super::normal_quantile(0.25)) - 0.9).abs() < 1e-9);
         // Cauchy's: a quarter lies above 1.
         let student = Distribution::StudentT { standard_uncertainty_um: 3.0, degrees_of_freedom: 1.0 };

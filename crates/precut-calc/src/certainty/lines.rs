@@ -19,6 +19,8 @@ use super::{normal_below, normal_quantile};
 const SCRAMBLINGS: usize = 8;
 /// Lines of a scrambling at first: of the near model, and of the real one.
 const FIRST_LINES: [usize; 2] = [8, 2];
+/// Points of a scrambling at which a model is asked at first that costs much.
+const FIRST_POINTS: usize = 16;
 /// Largest error, of the probability and relative to the smaller of it and its complement.
 const LARGEST_ERROR: [f64; 2] = [0.002, 0.1];
 /// Share of the error that the near model may take of itself.
@@ -233,6 +235,89 @@ impl<const N: usize> Sketch<N> {
             }
         }
         Ok(sums.map(|sum| sum / self.lines.len().max(1) as f64))
+    }
+}
+
+/// A model that costs much, asked at scattered points; what they tell is corrected by what a near model, which is known on all
+/// lines, is off at the same points (`certainty/7.1`).
+pub(crate) struct Sampled {
+    /// Margins by the real model, by scrambling.
+    points: [Vec<(Vec<f64>, f64)>; SCRAMBLINGS],
+}
+
+/// Margins of the real model at many points at once.
+pub(crate) type Real<'a> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<f64>, Failure> + 'a;
+
+/// The probability that the margin of a near model is above a number.
+pub(crate) type NearlyKept<'a> = dyn Fn(f64) -> Result<f64, Failure> + 'a;
+
+impl Sampled {
+    /// Up to `most` points of every scrambling, twice as many until the margin is kept with a probability that is known to `enough`.
+    pub(crate) fn until(
+        (enough, most): (f64, usize),
+        (dimensions, effort): (usize, Effort),
+        (near, nearly): (&dyn Fn(&[f64]) -> f64, &NearlyKept<'_>),
+        real: &mut Real<'_>,
+    ) -> Result<Self, Failure> {
+        let mut sampled = Self { points: std::array::from_fn(|_| Vec::new()) };
+        let mut count = FIRST_POINTS.min(most);
+        loop {
+            let mut asked = Vec::new();
+            for (scrambling, known) in sampled.points.iter().enumerate() {
+                asked.extend(points(count, dimensions, effort.scrambled(scrambling)).skip(known.len()));
+            }
+            let margins = real(&asked)?;
+            let more = count - sampled.points[0].len();
+            for (known, some) in
+                sampled.points.iter_mut().zip(asked.into_iter().zip(margins).collect::<Vec<_>>().chunks(more))
+            {
+                known.extend_from_slice(some);
+            }
+            if sampled.kept(0.0, near, nearly)?.error <= enough || count >= most {
+                return Ok(sampled);
+            }
+            count = (2 * count).min(most);
+        }
+    }
+
+    /// The probability that the margin is above `least`; `nearly` is that of the near model.
+    pub(crate) fn kept(
+        &self,
+        least: f64,
+        near: &dyn Fn(&[f64]) -> f64,
+        nearly: &NearlyKept<'_>,
+    ) -> Result<Estimate, Failure> {
+        let is = |kept: bool| f64::from(u8::from(kept));
+        let both: Vec<Vec<(f64, f64)>> = self
+            .points
+            .iter()
+            .map(|own| own.iter().map(|(g, margin)| (is(*margin >= least), is(near(g) >= least))).collect())
+            .collect();
+        let all: Vec<(f64, f64)> = both.iter().flatten().copied().collect();
+        let count = all.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>() / count;
+        let (real, nearby, together) = (mean(&|one| one.0), mean(&|one| one.1), mean(&|one| one.0 * one.1));
+        // As much of the correction as lowers the scatter most.
+        let variance = nearby * (1.0 - nearby);
+        let share = if variance > 0.0 { ((together - real * nearby) / variance).clamp(0.0, 1.0) } else { 0.0 };
+        let exact = if share > 0.0 { nearly(least)? } else { 0.0 };
+        let means = std::array::from_fn(|one| {
+            let own = &both[one];
+            own.iter().map(|(real, near)| real + share * (exact - near)).sum::<f64>() / own.len().max(1) as f64
+        });
+        Ok(Estimate::of(means))
+    }
+
+    /// How often the real model was asked.
+    pub(crate) fn asked(&self) -> usize {
+        self.points.iter().map(Vec::len).sum()
+    }
+
+    /// Variance of what the real margin is off the near one.
+    pub(crate) fn variance_off(&self, near: &dyn Fn(&[f64]) -> f64) -> f64 {
+        let off: Vec<f64> = self.points.iter().flatten().map(|(g, margin)| margin - near(g)).collect();
+        let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
+        off.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64
     }
 }
 

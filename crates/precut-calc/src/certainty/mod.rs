@@ -7,15 +7,19 @@
 mod answer;
 mod distribution;
 pub(crate) mod lines;
+pub(crate) mod picture;
 mod quantities;
 mod scores;
 mod surface;
 
-pub use answer::{Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts};
+pub use answer::{
+    Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts,
+};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};
 pub(crate) use quantities::{
-    CODES as QUANTITY_CODES, Pair, Quantity, Uncertain, Uncertainties, check_correlations, check_quantities,
+    CODES as QUANTITY_CODES, MISSING_CODES, Pair, Quantity, Uncertain, Uncertainties, check_correlations,
+    check_presence, check_quantities,
 };
 pub(crate) use scores::{Contradiction, Scores};
 pub(crate) use surface::Surface;

@@ -55,7 +55,7 @@ impl<Q: Quantity> Uncertainties<Q> {
         Ok(Self { of, scores })
     }
 
-    /// What every quantity comes to at independent scores: factors, and additions in um.
+    /// What every quantity comes to at independent scores: factors, and additions in their unit.
     pub(crate) fn values(&self, independent: &[f64]) -> Vec<f64> {
         self.of.iter().zip(self.scores.of(independent)).map(|(one, score)| one.distribution.at(score)).collect()
     }
@@ -85,6 +85,26 @@ pub(crate) fn check_quantities<Q: Quantity>(stated: &[(Q, &Distribution)], viola
         violations.require(stated[..i].iter().all(|before| before.0 != *quantity), || {
             Finding::new("duplicate_quantity", at("/quantity")).with("quantity", quantity.name())
         });
+    }
+}
+
+/// Code of a quantity that is uncertain in a job that has none of it.
+pub(crate) const MISSING_CODES: &[&str] = &["quantity_of_nothing"];
+
+/// Finds quantities that a job has not; `missing_in` is the field without which there is none, where it is not there.
+pub(crate) fn check_presence<Q: Quantity>(
+    stated: impl IntoIterator<Item = Q>,
+    missing_in: impl Fn(Q) -> Option<&'static str>,
+    violations: &mut Violations,
+) {
+    for (i, quantity) in stated.into_iter().enumerate() {
+        if let Some(field) = missing_in(quantity) {
+            violations.add(
+                Finding::new("quantity_of_nothing", format!("/uncertainty/quantities/{i}/quantity"))
+                    .with("quantity", quantity.name())
+                    .with("field", field),
+            );
+        }
     }
 }
 

@@ -455,7 +455,7 @@ pub(super) fn warnings(
     }
     found.extend(missed_tolerances(job, outcome));
     found.extend(soundness::warnings(job, grid, stage, outcome, uncertainty_um));
-    found.extend(outcome.conformance.iter().flat_map(conformance::warnings));
+    found.extend(outcome.conformance.iter().flat_map(|found| conformance::warnings(job, found)));
     found
 }
 

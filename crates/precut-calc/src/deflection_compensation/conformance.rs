@@ -7,6 +7,7 @@ use crate::certainty::{
     Surface, Uncertainties, bounded, normal_below,
 };
 
+use super::acceptance;
 use super::input::{Aim, Job, SizeLimits};
 use super::output::ErrorFan;
 use super::rehearsal::Rehearsal;
@@ -24,7 +25,7 @@ const JOINT: usize = 4;
 /// Most lines of one scrambling: for a probability, for what something else would make of it on the same lines, and for what a
 /// measured part would make of it.
 const MOST_LINES: [usize; 3] = [128, 8, 32];
-/// Standard uncertainty of the gauge with which a first part is measured, um.
+/// Standard uncertainty of the gauge with which a first part is measured where none is stated, um.
 const GAUGE_UM: f64 = 1.0;
 /// Parts of which a fan is made.
 const FAN_PARTS: usize = 256;
@@ -54,7 +55,7 @@ pub(super) struct Judged<'a> {
 
 /// By what a part is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum By {
+pub(super) enum By {
     /// Station by station along the path.
     Rehearsal,
     /// A response surface of that.
@@ -155,6 +156,32 @@ impl<'a> Judged<'a> {
         }
     }
 
+    pub(super) fn limits(&self) -> SizeLimits {
+        self.limits
+    }
+
+    pub(super) fn axis(&self) -> &[f64] {
+        &self.axis
+    }
+
+    pub(super) fn monitor(&self) -> &dyn Monitor {
+        self.monitor
+    }
+
+    /// Largest and smallest error of a part; `None` of one that cannot be cut.
+    pub(super) fn ends_um(&self, by: By, independent: &[f64], shift_um: f64) -> Result<Option<[f64; 2]>, Failure> {
+        match self.errors_um(by, &self.uncertainties, independent, shift_um) {
+            Ok(errors_um) => Ok(Some(self.rehearsal.extremes_um(&errors_um))),
+            Err(Failure::OutOfModel(_)) => Ok(None),
+            Err(failure) => Err(failure),
+        }
+    }
+
+    /// Standard uncertainty of the gauge, um.
+    fn gauge_um(&self) -> f64 {
+        self.job.uncertainty.measurement.map_or(GAUGE_UM, |gauge| gauge.standard_uncertainty_um)
+    }
+
     /// Errors by station as they are stated.
     fn stated_um(&self) -> &[f64] {
         self.near.surface.at_point()
@@ -188,7 +215,7 @@ impl<'a> Judged<'a> {
         Question { axis, sets: SETS, effort: self.effort(most_lines), monitor: self.monitor }
     }
 
-    fn effort(&self, most_lines: usize) -> Effort {
+    pub(super) fn effort(&self, most_lines: usize) -> Effort {
         Effort { seed: self.job.uncertainty.seed, most_lines }
     }
 
@@ -388,6 +415,10 @@ impl<'a> Judged<'a> {
             },
             contributions,
             advice,
+            acceptance: match uncertainty.measurement {
+                Some(gauge) => self.acceptance(gauge.standard_uncertainty_um, shift_um)?,
+                None => None,
+            },
             method: ConformanceMethod {
                 integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
                 linear_probability: bounded(self.linear_probability()?),
@@ -459,6 +490,7 @@ impl<'a> Judged<'a> {
     /// What a measured first part would make of it: the command is shifted by what the scores that all parts share are to be
     /// expected at, given the reading, to first order; that is tried on the real model (`certainty/4.4`).
     fn first_part(&self, shift_um: f64, now: Estimate) -> Result<Option<Improvement>, Failure> {
+        let gauge = self.gauge_um();
         let (errors_um, slopes_um) = (self.stated_um(), &self.slopes.of_um);
         let is_common = |index: usize| self.uncertainties.of[index].level == Level::Setup;
         // Scores of one level that are correlated with the other have no conditional distribution of that form.
@@ -474,7 +506,7 @@ impl<'a> Judged<'a> {
         };
         let told = |station: usize| {
             let (common, own) = split(&slopes_um[station]);
-            (common, common + own + GAUGE_UM * GAUGE_UM)
+            (common, common + own + gauge * gauge)
         };
         // Where a reading tells most of what all parts share.
         let station = (0..slopes_um.len())
@@ -503,7 +535,7 @@ impl<'a> Judged<'a> {
         let later = |by: By, scores: &[f64]| -> Result<Margins<LIMITS>, Failure> {
             let mut first = scores[..h.len()].to_vec();
             own.iter().zip(&scores[h.len()..]).for_each(|(&index, score)| first[index] = *score);
-            let gauge_um = GAUGE_UM * scores[h.len() + own.len()];
+            let gauge_um = gauge * scores[h.len() + own.len()];
             match self.errors_um(by, &self.uncertainties, &first, shift_um) {
                 Ok(errors) => {
                     let shift = as_expected + slope * (errors[station] + gauge_um - errors_um[station]);
@@ -530,7 +562,7 @@ impl<'a> Judged<'a> {
         let error = now.error + then.error;
         Ok((gain > error).then(|| Improvement::MeasureFirstPart {
             z_mm: self.rehearsal.z_mm()[station],
-            gauge_um: GAUGE_UM,
+            gauge_um: gauge,
             expected_um: errors_um[station],
             shift_as_expected_um: as_expected - shift_um,
             shift_um_per_um: slope,
@@ -607,13 +639,18 @@ pub(super) fn said(conformance: &Conformance) -> Vec<Message> {
             .with("shift_um_per_um", shift_um_per_um)
             .with("percent", 100.0 * joint_probability),
     });
-    std::iter::once(first).chain(advised).collect()
+    let accepted = conformance.acceptance.as_ref().map(acceptance::said);
+    std::iter::once(first).chain(advised).chain(accepted).collect()
 }
 
 /// What is warned of.
-pub(super) fn warnings(conformance: &Conformance) -> Vec<Finding> {
+pub(super) fn warnings(job: &Job, conformance: &Conformance) -> Vec<Finding> {
     let joint = &conformance.joint;
     let mut found = Vec::new();
+    let width_um = job.tolerance.size().half_width_um().map(|half| 2.0 * half);
+    if let (Some(gauge), Some(width_um), None) = (&job.uncertainty.measurement, width_um, &conformance.acceptance) {
+        found.push(acceptance::none_left(gauge.standard_uncertainty_um, width_um));
+    }
     if !joint.met {
         found.push(
             Finding::new("improbable", "/uncertainty/wanted_probability")

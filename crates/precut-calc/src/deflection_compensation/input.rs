@@ -426,6 +426,9 @@ pub struct Uncertainty {
     #[serde(default = "yes")]
     #[schema(default = true, example = true)]
     pub defaults: bool,
+    /// With what parts are measured; the answer says then which readings to accept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measurement: Option<GaugeUncertainty>,
     /// Probability of a good part that is wanted; below it the answer warns.
     #[serde(default = "nineteen_of_twenty")]
     #[schema(exclusive_minimum = 0.0, exclusive_maximum = 1.0, default = 0.95, example = 0.95, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("P"))))]
@@ -438,6 +441,15 @@ pub struct Uncertainty {
     #[serde(default = "one")]
     #[schema(minimum = 0, maximum = 100_000_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("seed"))))]
     pub seed: u32,
+}
+
+/// With what parts are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GaugeUncertainty {
+    /// Standard uncertainty of a reading of a diameter; its error is the same for all readings of a part.
+    #[schema(exclusive_minimum = 0.0, maximum = 1000.0, example = 1.2, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("u_m"))))]
+    pub standard_uncertainty_um: f64,
 }
 
 fn yes() -> bool {
@@ -467,6 +479,7 @@ impl Default for Uncertainty {
             stiffness_percent: ten_percent(),
             quantities: Vec::new(),
             correlations: Vec::new(),
+            measurement: None,
             defaults: yes(),
             wanted_probability: nineteen_of_twenty(),
             parts_per_setup: hundred(),

@@ -12,6 +12,7 @@
 //! `driven`: `toolpath` and what it gives and meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
 //! `forward` gives the same model to the diagnosis, `held` to a program that is there.
 
+mod acceptance;
 mod acting;
 mod advice;
 mod auto;
@@ -55,9 +56,9 @@ pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub(crate) use held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
 pub use input::{
-    Aim, Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass,
-    PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations,
-    StockRow, Support, Theory, Tolerance, Uncertainty,
+    Aim, Carriage, Cut, Detail, FeedDirection, GaugeUncertainty, Gravity, Include, IncludeMode, Job, Limits,
+    MAX_STATIONS, Pass, PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft,
+    SpeedDiameter, Stations, StockRow, Support, Theory, Tolerance, Uncertainty,
 };
 pub use measurement::DeflectionMeasurement;
 pub use output::{
@@ -97,7 +98,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -139,7 +140,13 @@ impl Calculator for DeflectionCompensation {
             Hallmark::Of("/cut/spindle_speed_rpm"),
             Hallmark::Of("/tolerance/form_um"),
         ],
-        study_outputs: &["/form_error_um", "/form_error_after_um", "/largest_error_um", "/cutting_time_min"],
+        study_outputs: &[
+            "/form_error_um",
+            "/form_error_after_um",
+            "/largest_error_um",
+            "/cutting_time_min",
+            "/conformance/joint/probability",
+        ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
@@ -400,11 +407,17 @@ const CODES: Codes = Codes {
     warnings: &[
         advice::WARNING_CODES,
         conformance::WARNING_CODES,
+        acceptance::WARNING_CODES,
         soundness::WARNING_CODES,
         second_order::WARNING_CODES,
         force::WARNING_CODES,
     ],
-    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES],
+    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, acceptance::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
-    labels: &[picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
+    labels: &[
+        picture::LABEL_CODES,
+        picture::DOUBT_LABELS,
+        certainty::picture::LABEL_CODES,
+        crate::shaft::handles::LABEL_CODES,
+    ],
 };

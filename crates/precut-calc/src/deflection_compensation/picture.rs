@@ -1,6 +1,7 @@
 //! Figures and tables of an answer.
 
 use crate::calculator::{Along, Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
+use crate::certainty::picture as doubt;
 
 use super::columns::offsets_um;
 use super::input::{Job, Support};
@@ -10,8 +11,23 @@ use crate::shaft::handles::handles;
 
 const Z: Axis = Axis::linear("station", "mm");
 
-pub(super) const FIGURE_IDS: &[&str] = &["profile", "compliance", "path"];
-pub(super) const TABLE_IDS: &[&str] = &["stations", "path", "increments", "one_step", "passes"];
+pub(super) const FIGURE_IDS: &[&str] = &["profile", "compliance", "path", doubt::ID];
+pub(super) const TABLE_IDS: &[&str] = &["stations", "path", "increments", "one_step", "passes", doubt::ID];
+
+/// Codes of what may be doubted, in the picture of the doubt.
+pub(super) const DOUBT_LABELS: &[&str] = &[
+    "doubt_force",
+    "doubt_stiffness",
+    "doubt_youngs_modulus",
+    "doubt_headstock_compliance",
+    "doubt_tailstock_compliance",
+    "doubt_rest_compliance",
+    "doubt_carriage_compliance",
+    "doubt_rest_gap",
+    "doubt_tool_setting",
+    "doubt_stock_diameter",
+    "doubt_spindle_scatter",
+];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -41,7 +57,9 @@ pub(super) const LABEL_CODES: &[&str] = &[
 
 pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
     let title = |code| Message::new(code);
-    vec![
+    let sure = outcome.conformance.as_ref();
+    let doubted = sure.and_then(|sure| doubt::figure(&sure.contributions, &sure.joint, DOUBT_LABELS));
+    let mut figures = vec![
         Figure {
             id: "profile",
             title: title("deflection_profile"),
@@ -68,7 +86,9 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
             x: Z,
             panels: vec![path(outcome, 1.2), one_step(outcome, 0.8)],
         },
-    ]
+    ];
+    figures.extend(doubted);
+    figures
 }
 
 fn some(values: &[f64]) -> Vec<Option<f64>> {
@@ -241,6 +261,7 @@ pub(super) fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
         increments_table(outcome),
         one_step_table(outcome),
         passes_table(outcome),
+        doubt::table(outcome.conformance.as_ref().map_or(&[], |sure| &sure.contributions)),
     ]
 }
 

@@ -76,7 +76,7 @@ use crate::calculator::{
     Place, Table, checkpoint,
 };
 
-use crate::certainty::{DISTRIBUTION_CODES, QUANTITY_CODES};
+use crate::certainty::{DISTRIBUTION_CODES, MISSING_CODES, QUANTITY_CODES};
 
 use acting::Case;
 use answer::{Study, outcome};
@@ -225,9 +225,9 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
 const CODES: Codes = Codes {
     faults: &[
         check::CODES,
-        uncertain::CODES,
         DISTRIBUTION_CODES,
         QUANTITY_CODES,
+        MISSING_CODES,
         &["time_missing", "opened_without_clamp_force"],
     ],
     failures: &[&["undamped_resonance"]],
@@ -242,5 +242,5 @@ const CODES: Codes = Codes {
         "stage_certainty",
         "stage_fixture_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };

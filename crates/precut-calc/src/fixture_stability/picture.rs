@@ -1,6 +1,7 @@
 //! Figures and tables of an answer.
 
 use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Place, Role, Said, Setting, Table};
+use crate::certainty::picture as doubt;
 
 use super::floquet::Working;
 use super::input::FixtureJob;
@@ -8,8 +9,21 @@ use super::lobes::Map;
 use super::output::{AmplitudeCurve, ArcProfile, FixtureOutcome, LobeBoundary, LobeDiagram, LobeMap, Oscillogram};
 use super::probable_depths::ProbableDepths;
 
-pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "last_revolution", "chip", "amplitude"];
-pub(super) const TABLE_IDS: &[&str] = &["boundary", "map", "amplitude", "probable_depths", "entry", "steady", "arc"];
+pub(super) const FIGURE_IDS: &[&str] = &["lobes", "oscillogram", "last_revolution", "chip", "amplitude", doubt::ID];
+pub(super) const TABLE_IDS: &[&str] =
+    &["boundary", "map", "amplitude", "probable_depths", "entry", "steady", "arc", doubt::ID];
+
+/// Codes of what may be doubted, in the picture of the doubt.
+pub(super) const DOUBT_LABELS: &[&str] = &[
+    "doubt_joint_stiffness",
+    "doubt_movable_joint_stiffness",
+    "doubt_fixed_joint_stiffness",
+    "doubt_damping",
+    "doubt_workpiece_mass",
+    "doubt_cutting_force",
+    "doubt_clamp_force",
+    "doubt_friction",
+];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -117,6 +131,8 @@ pub(super) fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure>
         figures.push(chip(&history.arc));
     }
     figures.extend(outcome.limits.as_ref().map(|limits| amplitude(job, outcome, &limits.curve)));
+    let sure = outcome.conformance.as_ref();
+    figures.extend(sure.and_then(|sure| doubt::figure(&sure.contributions, &sure.joint, DOUBT_LABELS)));
     figures
 }
 
@@ -325,6 +341,7 @@ pub(super) fn tables(outcome: &FixtureOutcome) -> Vec<Table> {
                 Column::numbers("smooth_chip", "mm", &arc.smooth_chip_mm),
             ],
         },
+        doubt::table(outcome.conformance.as_ref().map_or(&[], |sure| &sure.contributions)),
     ]
 }
 

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::calculator::{Finding, Violations};
+use crate::calculator::Violations;
 use crate::certainty::{
     Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
-    check_correlations, check_quantities,
+    check_correlations, check_presence, check_quantities,
 };
 
 use super::acting::Case;
@@ -20,9 +20,6 @@ const CUTTING_FORCE: f64 = 0.10;
 const SET_BY_HAND: f64 = 0.15;
 const SET_BY_PRESSURE: f64 = 0.05;
 const FRICTION: f64 = 0.20;
-
-/// Codes of the faults found here.
-pub(super) const CODES: &[&str] = &["quantity_of_nothing"];
 
 /// A quantity that is not known exactly; all are factors on what the job states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -236,13 +233,5 @@ pub(super) fn check(job: &FixtureJob, violations: &mut Violations) {
     let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
     check_quantities(&quantities, violations);
     check_correlations(&pairs(stated), || uncertainties(job).err(), violations);
-    for (i, one) in stated.quantities.iter().enumerate() {
-        if let Some(field) = one.quantity.missing_in(job) {
-            violations.add(
-                Finding::new("quantity_of_nothing", format!("/uncertainty/quantities/{i}/quantity"))
-                    .with("quantity", one.quantity.name())
-                    .with("field", field),
-            );
-        }
-    }
+    check_presence(stated.quantities.iter().map(|one| one.quantity), |quantity| quantity.missing_in(job), violations);
 }

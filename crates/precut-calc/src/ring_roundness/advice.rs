@@ -42,6 +42,7 @@ pub(super) const WARNING_CODES: &[&str] = &[
     "points_flew_apart",
     "roots_incomplete",
     "machine_chatters",
+    "roundness_beyond_tolerance",
 ];
 
 /// Codes of the explanations made here.
@@ -87,6 +88,15 @@ pub(super) fn warnings(job: &Job, scene: &Scene, end: &Stance, outcome: &Outcome
             finding = finding.with("lobes", worst.lobes).with("factor", worst.factor_per_revolution());
         }
         found.push(finding);
+    }
+    if let (Some(tolerance), Some(roundness_um)) = (&job.tolerance, outcome.roundness_um)
+        && roundness_um > tolerance.roundness_um
+    {
+        found.push(Finding::new("roundness_beyond_tolerance", super::conformance::POINTER).measured(
+            roundness_um,
+            tolerance.roundness_um,
+            "um",
+        ));
     }
     if end.half_angle_rad < LOOSE_RAD {
         found.push(Finding::new("supports_too_close_unstable", "/supports/distance_mm").measured(

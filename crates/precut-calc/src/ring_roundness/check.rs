@@ -10,6 +10,7 @@ use super::sampling::samples_of;
 use super::scene::Scene;
 use super::stance::{JAMS_RAD, Stance, TOOL_CLEARANCE_RAD, at_radius, through_tip};
 use super::turning::plane::{dot, norm, sub};
+use super::uncertain;
 
 /// Codes of the faults found here.
 pub(super) const CODES: &[&str] = &[
@@ -47,6 +48,7 @@ pub(super) const CODES: &[&str] = &[
     "range_empty",
     "duplicate_analysis",
     "duplicate_effect",
+    "roundness_tolerance_missing",
 ];
 
 /// Points that a measured profile needs.
@@ -72,6 +74,7 @@ impl Check for Job {
         cut_force::check(self, violations);
         check_analyses(self, violations);
         check_effects(self, violations);
+        uncertain::check(self, violations);
         // Of a radius of nothing, or a feed backwards, the rest would only be consequences.
         if let Some(radius_mm) = mean_radius_mm(self).filter(|radius| fields_hold(self, *radius)) {
             check_deviation(self, radius_mm, violations);
@@ -224,6 +227,11 @@ fn check_analyses(job: &Job, violations: &mut Violations) {
     violations.require(!job.asks(Analysis::SettingsSearch) || job.settings_search.is_some(), || {
         Finding::new("search_range_missing", "/settings_search")
     });
+    if job.asks(Analysis::Certainty) {
+        violations.require(job.tolerance.is_some(), || Finding::new("roundness_tolerance_missing", "/tolerance"));
+        violations
+            .require(job.method == Method::ExactContact, || Finding::new("not_with_nearest_samples", "/analyses"));
+    }
 }
 
 fn check_effects(job: &Job, violations: &mut Violations) {

@@ -8,6 +8,7 @@ use crate::effects::{RingConditions, RingEffect};
 
 use super::cut_force::ForceLaw;
 use super::input_ranges::{MapRange, SearchRange, SpeedRange};
+use super::uncertain::RingUncertainty;
 
 /// Most steps of a run, revolutions times samples.
 pub(super) const MAX_STEPS: f64 = 2e9;
@@ -60,6 +61,14 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("cut"))))]
     pub forces: Option<Forces>,
+    /// What the drawing allows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-group" = json!("workpiece"))))]
+    pub tolerance: Option<RingTolerance>,
+    /// What is uncertain in the setting, and which probability is wanted; acts with the analysis `certainty`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
+    pub uncertainty: RingUncertainty,
     /// Filter before the circles are fitted.
     #[serde(default)]
     #[schema(default = "upr_50", example = "upr_50", extensions(("x-group" = json!("evaluation"))))]
@@ -91,7 +100,7 @@ pub struct Job {
     pub highest_order: u32,
     /// What is to be found out.
     #[serde(default = "analyses")]
-    #[schema(min_items = 1, max_items = 5, default = json!(["simulation"]), example = json!(["simulation", "linear_theory"]), extensions(("x-group" = json!("evaluation"))))]
+    #[schema(min_items = 1, max_items = 6, default = json!(["simulation"]), example = json!(["simulation", "linear_theory"]), extensions(("x-group" = json!("evaluation"))))]
     pub analyses: Vec<Analysis>,
     /// Work speeds of the map; acts with the analysis `speed_map`.
     #[serde(default)]
@@ -124,6 +133,15 @@ fn highest_order() -> u32 {
 }
 fn analyses() -> Vec<Analysis> {
     vec![Analysis::Simulation]
+}
+
+/// What the drawing allows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RingTolerance {
+    /// Roundness deviation about the least-squares circle, after the filter.
+    #[schema(exclusive_minimum = 0.0, maximum = 10_000.0, example = 5.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("t"))))]
+    pub roundness_um: f64,
 }
 
 /// A ring by its form.
@@ -433,6 +451,8 @@ pub enum Analysis {
     SetupMap,
     /// Fewest revolutions to a target roundness within machine limits.
     SettingsSearch,
+    /// How probably the ring comes out within its tolerance when the setting is not exact.
+    Certainty,
 }
 
 impl Job {

@@ -11,6 +11,7 @@
 mod advice;
 mod causes;
 mod check;
+mod conformance;
 mod cut_force;
 pub mod cylindricity;
 mod elsewhere;
@@ -40,12 +41,14 @@ mod stance;
 mod surface;
 mod tables;
 mod turning;
+mod uncertain;
 
+pub use conformance::RingConformance;
 pub use cut_force::{CutForce, ForceLaw};
 pub use forward::{RingAllowances, RingPoint, RingRun};
 pub use input::{
     Analysis, Drive, Dynamics, ErrorEstimate, Forces, Job, LongWave, Method, Mode, ModePlace, ProfileRow, Ring,
-    Rotation, Stiffness, Supports, Tool, Wave,
+    RingTolerance, Rotation, Stiffness, Supports, Tool, Wave,
 };
 pub use input_ranges::{MapRange, SearchRange, SpeedRange};
 pub use measurement::RingMeasurement;
@@ -58,6 +61,9 @@ pub use output_settings::{
     CutCell, Fate, LinearOutcome, MapCell, MapOutcome, OrderOutcome, RootOutcome, SearchOutcome, SearchSetting,
     SearchStatus, SecondStage, SpeedCell, SpeedMapOutcome, TriedColumns,
 };
+pub use uncertain::{RingCorrelation, RingQuantity, RingUncertainQuantity, RingUncertainty};
+
+use crate::certainty::{DISTRIBUTION_CODES, MISSING_CODES, QUANTITY_CODES};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
@@ -80,7 +86,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 6,
+        version: 7,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -130,6 +136,11 @@ impl Calculator for RingRoundness {
                 title: "A tool post that swings: which work speed does not chatter",
                 job: include_str!("examples/speeds.json"),
             },
+            Example {
+                id: "how_sure",
+                title: "How probably a ring stays within 3 µm when its tool stands half a degree off",
+                job: include_str!("examples/how_sure.json"),
+            },
         ],
         hallmarks: &[
             Hallmark::Of("/ring/radius_mm"),
@@ -138,7 +149,13 @@ impl Calculator for RingRoundness {
             Hallmark::Of("/tool/feed_mm_per_rev"),
             Hallmark::Of("/tool/revolutions"),
         ],
-        study_outputs: &["/roundness_um", "/roundness_unfiltered_um", "/mean_radius_mm", "/setting/coefficient_sum"],
+        study_outputs: &[
+            "/roundness_um",
+            "/roundness_unfiltered_um",
+            "/mean_radius_mm",
+            "/setting/coefficient_sum",
+            "/conformance/joint/probability",
+        ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: tables::TABLE_IDS,
@@ -177,6 +194,7 @@ struct Work {
     speeds: f64,
     map: f64,
     search: f64,
+    certainty: f64,
 }
 
 /// Measured on one core: 60 to 110 ns per step, rollers 0.3 to 0.5 us, the paper's algorithm 6 ns per step and point,
@@ -185,7 +203,7 @@ fn work(job: &Job) -> Work {
     let n = f64::from(sampling::samples_of(job));
     let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
     let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 90.0 };
-    let mut work = Work { simulation: 0.0, theory: 0.0, speeds: 0.0, map: 0.0, search: 0.0 };
+    let mut work = Work { simulation: 0.0, theory: 0.0, speeds: 0.0, map: 0.0, search: 0.0, certainty: 0.0 };
     if job.asks(Analysis::Simulation) {
         let runs = match job.error_estimate {
             ErrorEstimate::HalfSamples => 1.84,
@@ -225,6 +243,9 @@ fn work(job: &Job) -> Work {
             work.search += search_wide::work_ms(job, range, step_ns);
         }
     }
+    if job.asks(Analysis::Certainty) {
+        work.certainty = 1e-6 * conformance::RINGS * turns * f64::from(causes::nodes(job)) * step_ns;
+    }
     work
 }
 
@@ -238,6 +259,7 @@ fn cost(job: &Job) -> Cost {
         (work.speeds, "/speed_map/speeds"),
         (work.map, "/setup_map/tool_angles"),
         (work.search, "/settings_search/revolutions_max"),
+        (work.certainty, "/tool/revolutions"),
     ] {
         if part > ms {
             driver = field;
@@ -269,14 +291,16 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         speed_map: None,
         setup_map: None,
         settings_search: None,
+        conformance: None,
     };
     let whole = Share { monitor, from: 0.0, to: 1.0 };
     // Each part has the share of the progress that it is expected to take of the time.
     let work = work(job);
-    let total = work.simulation + work.theory + work.speeds + work.map + work.search;
+    let total = work.simulation + work.theory + work.speeds + work.map + work.search + work.certainty;
     let after = |done: f64| if total > 0.0 { done / total } else { 0.0 };
     let sped = work.simulation + work.theory + work.speeds;
-    let [simulated, sped, mapped] = [work.simulation, sped, sped + work.map].map(after);
+    let mapped = sped + work.map;
+    let [simulated, sped, mapped, searched] = [work.simulation, sped, mapped, mapped + work.search].map(after);
     if job.asks(Analysis::Simulation) {
         let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, simulated))?;
         if let (Some(end), Some(error)) = (&simulated.end, &simulated.end_error) {
@@ -299,10 +323,18 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         outcome.setup_map = Some(map::map(job, &scene, &end, whole.part(sped, mapped))?);
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
-        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, 1.0))?);
+        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, searched))?);
     }
-    let warnings = advice::warnings(job, &scene, &end, &outcome);
-    let explanation = advice::explanation(job, &scene, &end, &outcome);
+    if let (true, Some(tolerance)) = (job.asks(Analysis::Certainty), &job.tolerance) {
+        let share = whole.part(searched, 1.0);
+        outcome.conformance = Some(conformance::conformance(job, &scene, &end, tolerance.roundness_um, share)?);
+    }
+    let mut warnings = advice::warnings(job, &scene, &end, &outcome);
+    let mut explanation = advice::explanation(job, &scene, &end, &outcome);
+    if let Some(found) = &outcome.conformance {
+        warnings.extend(conformance::warning(found));
+        explanation.insert(0, conformance::said(found));
+    }
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { basis: basis(job, &outcome), output: outcome, warnings, explanation })
 }
@@ -392,6 +424,7 @@ fn basis(job: &Job, outcome: &Outcome) -> Vec<Basis> {
     add(job.dynamics.is_some(), &[("ring/5.6", "regenerative chatter: Tobias, Fishwick 1958; Tlusty, Polacek 1963")]);
     add(job.asks(Analysis::SetupMap) && job.setup_map.cut_everywhere, &[("ring/7.3", "simulation of every cell")]);
     add(job.asks(Analysis::SettingsSearch), &[("ring/5.4", COPYING), ("ring/7.1", "scan by simulation")]);
+    add(outcome.conformance.is_some(), &[("certainty/7.1", "lines over a response surface, rings cut on them")]);
     used.extend(
         job.effects.iter().map(|effect| Basis { equation: effect.cause().equation, source: "catalogue of effects" }),
     );
@@ -400,17 +433,18 @@ fn basis(job: &Job, outcome: &Outcome) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES],
+    faults: &[check::CODES, DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES],
     failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
-    warnings: &[advice::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES],
+    warnings: &[advice::WARNING_CODES, conformance::WARNING_CODES],
+    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES],
     stages: &[&[
         "stage_revolution",
         "stage_speed_map",
         "stage_setup_map",
         "stage_search",
         "stage_search_wide",
+        "stage_roundness_certainty",
         "stage_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::conformance::RingConformance;
 use super::cut_force::CutForce;
 use super::output_settings::{LinearOutcome, MapOutcome, SearchOutcome, SpeedMapOutcome};
 
@@ -40,6 +41,8 @@ pub struct Outcome {
     pub setup_map: Option<MapOutcome>,
     /// Fewest revolutions to the target.
     pub settings_search: Option<SearchOutcome>,
+    /// How probably the ring comes out within its tolerance; only with the analysis `certainty`.
+    pub conformance: Option<RingConformance>,
 }
 
 /// What the angles of tool and supports make of errors, at the end of the feed; exact but for rounding.

@@ -1,6 +1,7 @@
 //! Figures of an answer. What the job does not ask for has no figure.
 
 use crate::calculator::{Axis, Figure, Frame, Glyph, Item, Message, Panel, Role, Said, Setting};
+use crate::certainty::picture as doubt;
 
 use super::elsewhere::{CONTACT_SUPPORT, CONTACT_TOOL, THIS_SETTING};
 use super::input::Job;
@@ -9,7 +10,17 @@ use super::output_settings::{MapOutcome, SpeedMapOutcome};
 use super::scene::Scene;
 
 pub(super) const FIGURE_IDS: &[&str] =
-    &["polar", "profile", "history", "spectrum", "speeds", "map", "cut_map", "search"];
+    &["polar", "profile", "history", "spectrum", "speeds", "map", "cut_map", "search", doubt::ID];
+
+/// Codes of what may be doubted, in the picture of the doubt.
+pub(super) const DOUBT_LABELS: &[&str] = &[
+    "doubt_tool_angle",
+    "doubt_support_half_angle",
+    "doubt_compliance_ratio",
+    "doubt_roller_runout",
+    "doubt_blank_amplitude",
+    "doubt_phases",
+];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[
@@ -105,6 +116,8 @@ pub(super) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         figure.panels.retain(|panel| panel.items.iter().any(shows));
     }
     figures.retain(|figure| !figure.panels.is_empty());
+    let sure = outcome.conformance.as_ref();
+    figures.extend(sure.and_then(|sure| doubt::figure(&sure.contributions, &sure.joint, DOUBT_LABELS)));
     figures
 }
 

@@ -1,13 +1,25 @@
 //! Tables of an answer.
 
 use crate::calculator::{Column, Table};
+use crate::certainty::picture as doubt;
 
 use super::output::{HistoryColumns, Outcome, ProfileColumns, SpectrumColumns};
 use super::output_settings::{MapOutcome, OrderOutcome, SpeedCell, SpeedMapOutcome};
 use super::picture::WAVE_NAMES;
 
-pub(super) const TABLE_IDS: &[&str] =
-    &["profile", "history", "waves", "spectrum", "lobing", "roots", "speeds", "map", "search", "centre_path"];
+pub(super) const TABLE_IDS: &[&str] = &[
+    "profile",
+    "history",
+    "waves",
+    "spectrum",
+    "lobing",
+    "roots",
+    "speeds",
+    "map",
+    "search",
+    "centre_path",
+    doubt::ID,
+];
 
 pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
     let simulation = outcome.simulation.as_ref();
@@ -22,6 +34,7 @@ pub(super) fn tables(outcome: &Outcome) -> Vec<Table> {
         map_table(outcome.setup_map.as_ref()),
         search_table(outcome),
         path_table(outcome),
+        doubt::table(outcome.conformance.as_ref().map_or(&[], |sure| &sure.contributions)),
     ]
 }
 

@@ -31,6 +31,11 @@ pub(crate) fn norm(p: Vec2) -> f64 {
 pub(crate) fn turned(p: Vec2) -> Vec2 {
     [-p[1], p[0]]
 }
+/// Turned counter-clockwise by an angle, rad.
+pub(crate) fn rotated(p: Vec2, by_rad: f64) -> Vec2 {
+    let (sin, cos) = by_rad.sin_cos();
+    [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]]
+}
 /// Angle from the x axis, rad.
 pub(crate) fn angle(p: Vec2) -> f64 {
     p[1].atan2(p[0])
