@@ -238,6 +238,11 @@ impl Held {
         self.acting.force.depends_on_speed()
     }
 
+    /// Whether the effects change the force by one factor all along the work.
+    pub(crate) fn is_same_everywhere(&self) -> bool {
+        self.acting.force.same_everywhere()
+    }
+
     /// Forces over the depth at a place, with the effects in them.
     pub(crate) fn law(&self, force: &ForceModel, z_mm: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> DepthLaw {
         let change = &self.acting.force;

@@ -39,7 +39,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -91,7 +91,7 @@ impl Calculator for ProgramCompensation {
         // Over a blank a move is held against what it comes near to, however long the program is (measured).
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
         // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
-        let yielding_ms = if job.force.is_some() { 0.2 * lines as f64 } else { 0.0 };
+        let yielding_ms = if job.force.is_some() { 0.08 * lines as f64 } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
         let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
         // New feeds drive it until the schedule and what comes out at its feeds are one.

@@ -12,6 +12,7 @@ use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
 use super::aim::Aim;
 use super::along::{Along, SoFar, after};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
+use super::near::Near;
 use super::sections::{Lumps, slices};
 
 /// Why a program is not driven over a blank that yields.
@@ -149,7 +150,7 @@ struct Meant {
 impl Meant {
     /// Comes to the next move.
     fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
-        self.before.clone_from(&self.after);
+        self.before.become_as(&self.after);
         match bends_as.and_then(|ways| ways.get(&stroke.index)) {
             Some(ways) => ways.iter().for_each(|(shape, way)| self.after.cut_along(shape, way, stroke.one.line)),
             None => self.after.cut_along(&stroke.shape, &stroke.way, stroke.one.line),
@@ -212,8 +213,8 @@ pub(crate) fn yielding(
             force: &holding.force,
             with_main: holding.tangential,
             with_loads: job.mode.kind.refeeds(),
-            nominal: &meant.before,
-            real,
+            nominal: Near::of(&meant.before, shape, way),
+            real: Near::of(real, shape, way),
             goes_on: *last_cut == stroke.index.checked_sub(1),
             is_corrected: driven.corrected.contains(&stroke.index),
             aim: aim.as_ref(),
