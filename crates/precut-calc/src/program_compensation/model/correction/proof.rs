@@ -1,6 +1,6 @@
 //! The corrected program read and driven again (`program/7`): a program that fails is not given back.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::calculator::{Failure, Finding, Monitor};
 use crate::deflection_compensation::Holding;
@@ -143,7 +143,7 @@ pub(crate) fn proved(
     let is_same = program.moves.get(..same) == read.moves.get(..same)
         && read.moves.iter().take(same).all(|one| finishing.binary_search(&one.line).is_err());
     let goes_on = is_same.then_some(task.before);
-    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on };
+    let driven = Driven { goes_on, ..Driven::as_it_is(&finishing) };
     let mut after = yielding(&read, &again, holding, blank, driven, monitor)?;
     // What was meant is what the given program means.
     after.nominal.clone_from(&task.before.nominal);

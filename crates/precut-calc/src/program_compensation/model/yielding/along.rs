@@ -61,12 +61,17 @@ pub(super) struct Along<'a> {
     pub(super) straight_mm: f64,
     /// Whether it makes the contour.
     pub(super) is_finishing: bool,
+    /// Shares at which it is looked at, and no others; none where they are to be found.
+    pub(super) shares: Vec<f64>,
 }
 
 impl Along<'_> {
     /// Places, so close that between them the path is straight.
     pub(super) fn places(&self) -> Result<Vec<CutPlace>, Failure> {
         let mut kept = Kept::default();
+        if !self.shares.is_empty() {
+            return self.at(&self.shares, &[], &mut kept);
+        }
         let mut places = self.at(&self.first_shares(), &[], &mut kept)?;
         // Whether what lies behind a place may still be bent.
         let mut is_open = vec![true; places.len()];
