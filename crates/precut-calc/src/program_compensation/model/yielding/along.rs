@@ -3,7 +3,7 @@
 use crate::calculator::Failure;
 use crate::deflection_compensation::ToolPlace;
 
-use super::super::stock::{Part, Way};
+use super::super::stock::Way;
 use super::cut::{AXIS_MM, CutPlace, Cutting, Kept, Pace};
 use super::near::Near;
 
@@ -13,13 +13,6 @@ const APART_MM: f64 = 5.0;
 const APART_RAD: f64 = std::f64::consts::PI / 180.0;
 /// And no nearer than this where the path jumps, mm.
 const NEAREST_MM: f64 = 0.01;
-/// Of a move that makes the contour places at first stand in as many stretches at least, unless it is no longer than this, mm. Others
-/// begin with one stretch.
-const STRETCHES: f64 = 4.0;
-const SHORT_MM: f64 = 0.05;
-/// Where a move that is one stretch is looked at between its ends: beside the middle, at which a jump that lies there is on the straight
-/// line.
-const BESIDE_MIDDLE: f64 = 0.4;
 /// Most places at the beginning, and in all.
 const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
@@ -45,11 +38,6 @@ pub(super) fn after(so_far: SoFar, way: &Way, pace: Pace) -> SoFar {
     }
 }
 
-/// The value at a share of a straight line between two.
-fn between(from: f64, to: f64, share: f64) -> f64 {
-    from + share * (to - from)
-}
-
 /// A move along which places are laid.
 pub(super) struct Along<'a> {
     pub(super) cutting: Cutting<'a>,
@@ -59,8 +47,6 @@ pub(super) struct Along<'a> {
     pub(super) so_far: SoFar,
     pub(super) move_pace: Pace,
     pub(super) straight_mm: f64,
-    /// Whether it makes the contour.
-    pub(super) is_finishing: bool,
     /// Shares at which it is looked at, and no others; none where they are to be found.
     pub(super) shares: Vec<f64>,
 }
@@ -83,17 +69,15 @@ impl Along<'_> {
             if wanted.is_empty() {
                 break;
             }
-            let at = if places.len() == 2 { BESIDE_MIDDLE } else { 0.5 };
-            let shares: Vec<f64> = wanted.iter().map(|&i| between(places[i - 1].share, places[i].share, at)).collect();
-            let guesses: Vec<f64> =
-                wanted.iter().map(|&i| between(places[i - 1].lift_mm, places[i].lift_mm, at)).collect();
+            let shares: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].share + places[i].share)).collect();
+            let guesses: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].lift_mm + places[i].lift_mm)).collect();
             let found = self.at(&shares, &guesses, &mut kept)?;
             let (mut laid, mut open) = (Vec::new(), Vec::new());
             let mut next = wanted.iter().zip(&found).peekable();
             for (i, place) in places.iter().enumerate() {
                 if let Some((_, inside)) = next.next_if(|(at, _)| **at == i) {
                     let before: &CutPlace = &places[i - 1];
-                    let off = |of: fn(&CutPlace) -> f64| of(inside) - between(of(before), of(place), at);
+                    let off = |of: fn(&CutPlace) -> f64| of(inside) - 0.5 * (of(before) + of(place));
                     let off = off(|place| place.lift_mm).abs().max(off(|place| place.wanted_mm).abs());
                     let bent = off > self.straight_mm;
                     if let Some(last) = open.last_mut() {
@@ -114,8 +98,7 @@ impl Along<'_> {
     fn first_shares(&self) -> Vec<f64> {
         let length = self.way.length_mm();
         let turned = if let Way::Arc { turn, .. } = self.way { turn.abs() } else { 0.0 };
-        let least = if self.is_finishing && length > SHORT_MM { STRETCHES } else { 1.0 };
-        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(least, MOST_AT_FIRST);
+        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(4.0, MOST_AT_FIRST);
         // At most MOST_AT_FIRST.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = count as usize;
@@ -126,7 +109,8 @@ impl Along<'_> {
             && high - low > NEAREST_MM
         {
             let stock: &Near<'_> = &self.cutting.nominal;
-            for x in self.steps(stock, low, high) {
+            let steps = stock.parts_between(low, high).flat_map(|part| [part.piece.x0, part.piece.x1]);
+            for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
                 shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
             }
         }
@@ -145,31 +129,10 @@ impl Along<'_> {
         shares
     }
 
-    /// Where the stock may step between two places; where another move than one that makes the contour goes, only where it does.
-    fn steps(&self, stock: &Near<'_>, low: f64, high: f64) -> Vec<f64> {
-        let parts: Vec<&Part> = stock.parts_between(low, high).collect();
-        let inside = |x: &f64| low < *x && *x < high;
-        if self.is_finishing {
-            return parts
-                .iter()
-                .flat_map(|part| [part.piece.x0, part.piece.x1])
-                .take(MOST_STEPS)
-                .filter(inside)
-                .collect();
-        }
-        let height = |x: f64, [left, right]: [&Part; 2]| (left.piece.curve.at(x) - right.piece.curve.at(x)).abs();
-        let pairs = parts.windows(2).map(|pair| (pair[1].piece.x0, [pair[0], pair[1]]));
-        pairs
-            .filter(|(x, pair)| height(*x, *pair) > self.straight_mm)
-            .map(|(x, _)| x)
-            .take(MOST_STEPS)
-            .filter(inside)
-            .collect()
-    }
-
     /// What happens at shares, near lifts that are guessed, or those of the place before.
     fn at(&self, shares: &[f64], guesses_mm: &[f64], kept: &mut Kept) -> Result<Vec<CutPlace>, Failure> {
         let whole = after(self.so_far, self.way, self.move_pace);
+        let between = |from: f64, to: f64, share: f64| from + share * (to - from);
         let place = |&share: &f64| {
             let [z_mm, radius_mm] = self.way.at(share);
             ToolPlace {

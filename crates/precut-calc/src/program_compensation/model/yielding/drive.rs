@@ -232,11 +232,10 @@ pub(crate) fn yielding(
             aim: aim.as_ref(),
         };
         let is_corrected = cutting.is_corrected;
-        let is_finishing = driven.finishing.binary_search(&one.line).is_ok();
-        let straight_mm = STRAIGHT_MM[usize::from(!is_finishing)];
+        let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
         let from = cutting.meets_from();
         let shares = driven.places_of.map_or_else(Vec::new, |before| before.shares(stroke.index));
-        let along = Along { cutting, way, from, so_far: *so_far, move_pace, straight_mm, is_finishing, shares };
+        let along = Along { cutting, way, from, so_far: *so_far, move_pace, straight_mm, shares };
         let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
         if is_corrected && aim.is_none() {
