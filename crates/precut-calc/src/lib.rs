@@ -44,5 +44,5 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.calculator::<milling_stability::MillingStability>();
     registrar.calculator::<compliance_fit::ComplianceFit>();
     registrar.calculator::<receptance_fit::ReceptanceFit>();
-    registrar.calculator::<program_compensation::ProgramCompensation>();
+    registrar.diagnosable::<program_compensation::ProgramCompensation>();
 }

@@ -104,6 +104,7 @@ mod process_support;
 mod process_watch;
 mod program_across;
 mod program_correction;
+mod program_diagnosis;
 mod program_drawing;
 mod program_fuzz;
 mod program_keep_out;

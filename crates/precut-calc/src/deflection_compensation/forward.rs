@@ -29,9 +29,9 @@ use super::structure::{Structure, Variant};
 
 const UM_PER_MM: f64 = 1e3;
 /// Step of the divided differences in ln F and in the bending scale: truncation 1e-6, round-off 1e-12.
-const RELATIVE_STEP: f64 = 1e-3;
+pub(crate) const RELATIVE_STEP: f64 = 1e-3;
 /// Step of the divided difference along the shaft, mm.
-const GAUGE_STEP_MM: f64 = 0.05;
+pub(crate) const GAUGE_STEP_MM: f64 = 0.05;
 
 /// How wrong the base may be without that being a finding: standard deviations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -126,19 +126,31 @@ pub struct DeflectionPoint {
 
 /// What the measured value is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Measure {
+pub(crate) enum Measure {
     DiameterDeviation,
     RadiusDeviation,
     Diameter,
 }
 
-const QUANTITIES: &[Quantity] = &[
+pub(crate) const QUANTITIES: &[Quantity] = &[
     Quantity { name: "diameter_deviation_um", unit: "um", logarithmic: false },
     Quantity { name: "radius_deviation_um", unit: "um", logarithmic: false },
     Quantity { name: "diameter_mm", unit: "mm", logarithmic: false },
 ];
 
 impl Measure {
+    /// What rows are asked for.
+    pub(crate) fn asked(quantity: &str) -> Result<Self, PrepareError> {
+        Self::named(quantity).ok_or_else(|| {
+            let known: Vec<&'static str> = QUANTITIES.iter().map(|q| q.name).collect();
+            PrepareError::Invalid(vec![
+                Finding::new("unknown_quantity", "/quantity")
+                    .with("quantity", quantity.to_owned())
+                    .with("known", known),
+            ])
+        })
+    }
+
     fn named(name: &str) -> Option<Self> {
         match name {
             "diameter_deviation_um" => Some(Self::DiameterDeviation),
@@ -148,7 +160,8 @@ impl Measure {
         }
     }
 
-    fn of(self, produced_mm: f64, target_mm: f64) -> f64 {
+    /// Of radii that are produced and wanted.
+    pub(crate) fn of(self, produced_mm: f64, target_mm: f64) -> f64 {
         match self {
             Self::DiameterDeviation => 2.0 * (produced_mm - target_mm) * UM_PER_MM,
             Self::RadiusDeviation => (produced_mm - target_mm) * UM_PER_MM,
@@ -175,6 +188,18 @@ pub struct PreparedDeflection {
     conditions_of_runs: Vec<DeflectionRun>,
     /// Run and station of every row.
     places: Vec<(usize, f64)>,
+}
+
+impl PreparedDeflection {
+    /// Rows along work that another model turns: what can be said of their causes, and no prediction.
+    pub(crate) fn of_causes(
+        job: Job,
+        conditions_of_runs: Vec<DeflectionRun>,
+        places: Vec<(usize, f64)>,
+        measure: Measure,
+    ) -> Self {
+        Self { runs: Vec::new(), rows: places.len(), measure, job, conditions_of_runs, places }
+    }
 }
 
 struct PreparedRun {
@@ -238,14 +263,7 @@ impl ForwardModel for DeflectionCompensation {
         quantity: &str,
         monitor: &dyn Monitor,
     ) -> Result<PreparedDeflection, PrepareError> {
-        let measure = Measure::named(quantity).ok_or_else(|| {
-            let known: Vec<&'static str> = QUANTITIES.iter().map(|q| q.name).collect();
-            PrepareError::Invalid(vec![
-                Finding::new("unknown_quantity", "/quantity")
-                    .with("quantity", quantity.to_owned())
-                    .with("known", known),
-            ])
-        })?;
+        let measure = Measure::asked(quantity)?;
         let faults = faults_of_rows(job, rows);
         if !faults.is_empty() {
             return Err(PrepareError::Invalid(faults));
@@ -733,25 +751,11 @@ struct About<'a> {
 }
 
 impl About<'_> {
-    /// What is off in one run by itself: setting, force and place of the gauge, run by run.
+    /// What is off in one run by itself.
     fn of_runs(&self, by_force: &[f64], allowances: &DeflectionAllowances) -> Result<Vec<JacobianColumn>, Failure> {
-        let prepared = self.prepared;
+        let rows = self.prepared.runs.iter().map(|run| run.row_of_station.as_slice());
         let along = self.slope_along()?;
-        let ones = vec![prepared.measure.per_diameter_um(); prepared.rows];
-        let mut columns = Vec::new();
-        for run in &prepared.runs {
-            let mut within = |column: &[f64], by: f64| {
-                let mut of_run = vec![0.0; prepared.rows];
-                for &row in &run.row_of_station {
-                    of_run[row] = column[row] * by;
-                }
-                columns.push(of_run);
-            };
-            within(&ones, allowances.setup_diameter_um);
-            within(by_force, allowances.force_per_run_rel);
-            within(&along, allowances.gauge_position_mm);
-        }
-        Ok(columns)
+        Ok(columns_of_runs(rows, self.prepared.measure, (by_force, &along), allowances))
     }
 
     fn predicted(&self, runs: &[PreparedRun], effects: &[DeflectionEffect]) -> Result<Vec<Prediction>, Failure> {
@@ -790,7 +794,34 @@ impl About<'_> {
     }
 }
 
-fn difference(below: &[Prediction], above: &[Prediction], span: f64) -> Vec<f64> {
+/// What is off in one run by itself: setting, force and place of the gauge, run by run, of each its rows. The slopes by force and place
+/// are those of all rows.
+pub(crate) fn columns_of_runs<'r>(
+    rows_of_runs: impl Iterator<Item = &'r [usize]>,
+    measure: Measure,
+    (by_force, along): (&[f64], &[f64]),
+    allowances: &DeflectionAllowances,
+) -> Vec<JacobianColumn> {
+    let ones = vec![measure.per_diameter_um(); by_force.len()];
+    let allowed = [
+        (ones.as_slice(), allowances.setup_diameter_um),
+        (by_force, allowances.force_per_run_rel),
+        (along, allowances.gauge_position_mm),
+    ];
+    let of_run = |rows: &'r [usize]| {
+        allowed.map(|(column, by)| {
+            let mut of_run = vec![0.0; column.len()];
+            for &row in rows {
+                of_run[row] = column[row] * by;
+            }
+            of_run
+        })
+    };
+    rows_of_runs.flat_map(of_run).collect()
+}
+
+/// What lies between two predictions, over a span.
+pub(crate) fn difference(below: &[Prediction], above: &[Prediction], span: f64) -> Vec<f64> {
     below
         .iter()
         .zip(above)

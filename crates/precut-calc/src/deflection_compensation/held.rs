@@ -96,10 +96,15 @@ pub(crate) struct Gaps {
 impl Holding {
     /// Rules for supports, force law and effects, as a job of this calculator has them.
     pub(crate) fn check(&self, violations: &mut Violations) {
-        let job = self.job(self.shaft.segments.clone(), self.supports.clone(), FeedDirection::ToHeadstock);
+        let job = self.work();
         crate::shaft::check::supports(&job.shaft, &job.supports, violations);
         job.force.check("/force", violations);
         check_effects(&job, violations);
+    }
+
+    /// The held work as a job of this calculator, which has no cut.
+    pub(crate) fn work(&self) -> Job {
+        self.job(self.shaft.segments.clone(), self.supports.clone(), FeedDirection::ToHeadstock)
     }
 
     fn job(&self, segments: Vec<Segment>, supports: Vec<super::input::Support>, feed_direction: FeedDirection) -> Job {
@@ -236,6 +241,11 @@ impl Held {
     /// Whether an effect makes the force depend on the cutting speed.
     pub(crate) fn depends_on_speed(&self) -> bool {
         self.acting.force.depends_on_speed()
+    }
+
+    /// Whether the effects change the force by one factor all along the work.
+    pub(crate) fn is_same_everywhere(&self) -> bool {
+        self.acting.force.same_everywhere()
     }
 
     /// Forces over the depth at a place, with the effects in them.

@@ -53,7 +53,8 @@ pub(crate) use check::EFFECT_CODES;
 pub(crate) use encounters::{Reach, chuck_in_the_way, met};
 pub(crate) use equilibrium::{Opening, engage};
 pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
-pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
+pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun, PreparedDeflection};
+pub(crate) use forward::{GAUGE_STEP_MM, Measure, QUANTITIES, RELATIVE_STEP, columns_of_runs, difference};
 pub(crate) use held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
 pub use input::{
     Aim, Carriage, Cut, Detail, FeedDirection, GaugeUncertainty, Gravity, Include, IncludeMode, Job, Limits,
@@ -61,6 +62,8 @@ pub use input::{
     SpeedDiameter, Stations, StockRow, Support, Theory, Tolerance, Uncertainty,
 };
 pub use measurement::DeflectionMeasurement;
+pub(crate) use measurement::{first, measured_diameters};
+pub(crate) use next_runs::longest_run;
 pub use output::{
     AddedSupport, ErrorFan, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares,
     StationColumns, StatusCompensated, StatusUncompensated,

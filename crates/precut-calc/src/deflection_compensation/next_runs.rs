@@ -50,7 +50,7 @@ pub(super) fn next_runs(
 }
 
 /// Places of the run with the most rows.
-fn longest_run(rows: &Rows<DeflectionRun, DeflectionPoint>) -> Vec<DeflectionPoint> {
+pub(crate) fn longest_run<R>(rows: &Rows<R, DeflectionPoint>) -> Vec<DeflectionPoint> {
     let of = |k: usize| rows.points.iter().filter(move |(run, _)| *run == k).map(|(_, point)| *point);
     (0..rows.runs.len()).max_by_key(|&k| of(k).count()).map_or_else(Vec::new, |k| of(k).collect())
 }

@@ -1,24 +1,27 @@
 //! The program that a shop has already (`program`): read as its control reads it.
 //!
 //! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves; the blank, rigid and yielding) -> `answer` (moves,
-//! errors, the corrected program, pictures, what is said).
+//! errors, the corrected program, pictures, what is said). `forward` is the model as a function of its effects, for parts that were
+//! measured.
 
 mod answer;
+mod forward;
 mod job;
+mod measurement;
 mod model;
 
 pub use answer::output::{
     CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
     Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
 };
+pub use forward::{PreparedProgram, ProgramRun};
 pub use job::{
     CorrectTo, DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart,
     ProgramStock, ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
 };
+pub use measurement::ProgramMeasurement;
 pub use model::correction::WhyLeftAlone;
 pub use model::reader::{ContourCycle, CycleKind, Kind, MAX_LINES, MAX_MOVES, Nose};
-
-use std::collections::BTreeSet;
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Finding, Hallmark, Message, Meta,
@@ -39,7 +42,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -91,7 +94,7 @@ impl Calculator for ProgramCompensation {
         // Over a blank a move is held against what it comes near to, however long the program is (measured).
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
         // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
-        let yielding_ms = if job.force.is_some() { 0.2 * lines as f64 } else { 0.0 };
+        let yielding_ms = if job.force.is_some() { 0.08 * lines as f64 } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
         let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
         // New feeds drive it until the schedule and what comes out at its feeds are one.
@@ -189,7 +192,7 @@ fn yielded(
     let (Some(holding), Some(blank), Some(turned)) = (job.holding(), blank, turned) else { return Ok(None) };
     monitor.progress(0.5, Message::new("stage_yielding"));
     let finishing = stock::lines_that_finish(turned);
-    let driven = yielding::Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on: None };
+    let driven = yielding::Driven::as_it_is(&finishing);
     yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
 }
 
@@ -273,7 +276,8 @@ const CODES: Codes = Codes {
         yielding::FAILURE_CODES,
         correction::FAILURE_CODES,
         refeed::FAILURE_CODES,
-        &["no_program_returned"],
+        // Of parts that were measured.
+        &["no_program_returned", "prediction_without_force", "station_outside_shaft"],
     ],
     warnings: &[
         reader::WARNING_CODES,

@@ -22,8 +22,8 @@ pub(super) struct Turning<'a> {
     frame: &'a Frame,
     plane: &'a Plane,
     order: usize,
-    /// By interval, of each the upper triangle by rows.
-    works: Vec<Raised>,
+    builder: Builder<'a>,
+    lost: Vec<[Resultant; 2]>,
     lanes: Vec<Lane>,
     /// Diagonal of the redundants before the elimination.
     pub(super) original: Vec<Lane>,
@@ -37,12 +37,8 @@ impl<'a> Turning<'a> {
         let order = columns + 1 + usize::from(rows.couple || rows.weight) + usize::from(rows.weight);
         let lost = if rows.weight { differences(frame) } else { Vec::new() };
         let builder = Builder { bending, plane, rows, order };
-        let size = order * (order + 1) / 2;
-        let mut works = vec![Raised::ZERO; size * frame.intervals.len()];
-        for (k, forms) in works.chunks_exact_mut(size).enumerate() {
-            builder.interval(k, &lost, forms);
-        }
-        Self { frame, plane, order, works, lanes: vec![[0.0; BLOCK]; size], original: vec![[0.0; BLOCK]; columns] }
+        let lanes = vec![[0.0; BLOCK]; order * (order + 1) / 2];
+        Self { frame, plane, order, builder, lost, lanes, original: vec![[0.0; BLOCK]; columns] }
     }
 
     /// All stations, block by block: the visitor finds the reduced works in [`Self::work`].
@@ -50,14 +46,20 @@ impl<'a> Turning<'a> {
         let mut rest = stations;
         let mut values = Vec::with_capacity(BLOCK);
         let last = self.frame.intervals.len() - 1;
-        let size = self.lanes.len();
+        // Of one interval: the upper triangle by rows.
+        let mut works = vec![Raised::ZERO; self.lanes.len()];
         for k in 0..=last {
             let interval = &self.frame.intervals[k];
             let count = if k == last { rest.len() } else { rest.partition_point(|place| *place < interval.end) };
             let (here, behind) = rest.split_at(count);
             let span = Span { start: interval.start, end: interval.end, inverse_length: 1.0 / interval.length };
+            // Stations of a short move lie in few of many intervals.
+            if !here.is_empty() {
+                works.fill(Raised::ZERO);
+                self.builder.interval(k, &self.lost, &mut works);
+            }
             for block in here.chunks(BLOCK) {
-                for (form, lane) in self.works[k * size..].iter().zip(&mut self.lanes) {
+                for (form, lane) in works.iter().zip(&mut self.lanes) {
                     values.clear();
                     sample(form, span, block, &mut values);
                     lane[..block.len()].copy_from_slice(&values);

@@ -86,7 +86,7 @@ pub(crate) fn corrected(
         }
         let drive = |bends_as: Option<&Instead>| {
             let goes_on = Some(before);
-            let driven = Driven { finishing: &finishing, corrected: &eligible, bends_as, goes_on };
+            let driven = Driven { corrected: &eligible, bends_as, goes_on, ..Driven::as_it_is(&finishing) };
             yielding(program, job, holding, (stock, zero), driven, monitor)
         };
         let planned = planned((program, job), (&ways, &calls), &eligible, drive)?;

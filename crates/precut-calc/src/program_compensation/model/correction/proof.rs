@@ -1,6 +1,6 @@
 //! The corrected program read and driven again (`program/7`): a program that fails is not given back.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::calculator::{Failure, Finding, Monitor};
 use crate::deflection_compensation::Holding;
@@ -143,7 +143,7 @@ pub(crate) fn proved(
     let is_same = program.moves.get(..same) == read.moves.get(..same)
         && read.moves.iter().take(same).all(|one| finishing.binary_search(&one.line).is_err());
     let goes_on = is_same.then_some(task.before);
-    let driven = Driven { finishing: &finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on };
+    let driven = Driven { goes_on, ..Driven::as_it_is(&finishing) };
     let mut after = yielding(&read, &again, holding, blank, driven, monitor)?;
     // What was meant is what the given program means.
     after.nominal.clone_from(&task.before.nominal);
@@ -201,10 +201,11 @@ struct Compared {
 fn outlines(planned: &[Part], real: &[Part], jumps: &[Jump], residual_mm: f64) -> Result<Compared, Failed> {
     let mut compared = Compared { residual_um: 0.0, residual_at_mm: 0.0, transitions: Vec::new() };
     let (mut thin, mut before_mm, mut is_open): (Vec<Off>, f64, bool) = (Vec::new(), f64::NEG_INFINITY, false);
+    let mut over = Over::of(jumps);
     for off in differences(planned, real) {
         let Off { z_mm, by_mm: off_mm, line } = off;
         let off_um = UM_PER_MM * off_mm;
-        let jump = jumps.iter().find(|jump| (jump.from_mm..=jump.to_mm).contains(&z_mm));
+        let jump = over.first_at(z_mm);
         let is_thick = off_mm > residual_mm;
         if off_mm < -residual_mm {
             thin.push(off);
@@ -230,6 +231,33 @@ fn outlines(planned: &[Part], real: &[Part], jumps: &[Jump], residual_mm: f64) -
         (is_open, before_mm) = (is_thick, z_mm);
     }
     if thin.is_empty() { Ok(compared) } else { Err(Failed::Thin(thin)) }
+}
+
+/// Jumps over places that follow each other along the work: a program of many short blocks has as many of them.
+struct Over<'a> {
+    jumps: &'a [Jump],
+    /// In the order in which they begin; how many have begun, and which of them go on.
+    order: Vec<usize>,
+    begun: usize,
+    open: Vec<usize>,
+}
+
+impl<'a> Over<'a> {
+    fn of(jumps: &'a [Jump]) -> Self {
+        let mut order: Vec<usize> = (0..jumps.len()).collect();
+        order.sort_by(|&a, &b| jumps[a].from_mm.total_cmp(&jumps[b].from_mm));
+        Self { jumps, order, begun: 0, open: Vec::new() }
+    }
+
+    /// The first of them over a place that is no nearer to the headstock than the one before.
+    fn first_at(&mut self, z_mm: f64) -> Option<&'a Jump> {
+        while let Some(&next) = self.order.get(self.begun).filter(|&&next| self.jumps[next].from_mm <= z_mm) {
+            self.open.push(next);
+            self.begun += 1;
+        }
+        self.open.retain(|&jump| self.jumps[jump].to_mm >= z_mm);
+        self.open.iter().min().map(|&jump| &self.jumps[jump])
+    }
 }
 
 /// Every move is as it was, but for the places at which corrected ones end.

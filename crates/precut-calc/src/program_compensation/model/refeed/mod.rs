@@ -205,7 +205,7 @@ fn failed(part: &'static str, line: usize) -> Failure {
 
 impl Task<'_> {
     fn drive_read(&self, job: &Job, program: &Program) -> Result<Yielded, Failure> {
-        let driven = Driven { finishing: self.finishing, corrected: &BTreeSet::new(), bends_as: None, goes_on: None };
+        let driven = Driven::as_it_is(self.finishing);
         yielding(program, job, self.holding, self.blank, driven, self.monitor)
     }
 

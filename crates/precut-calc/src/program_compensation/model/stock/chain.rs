@@ -13,6 +13,9 @@ const MOST: usize = 64;
 /// Neighbouring runs that have no more parts than this together become one.
 const FEW: usize = 16;
 
+/// A curve is followed so far above all work, mm.
+const BESIDE_MM: f64 = 0.01;
+
 /// What a tool comes to within this is its own, mm.
 pub(crate) const CONTACT_MM: f64 = 1e-3;
 
@@ -51,12 +54,6 @@ impl Run {
 
     fn x1(&self) -> f64 {
         self.parts.last().map_or(f64::NEG_INFINITY, |part| part.piece.x1)
-    }
-
-    fn overlapping(&self, piece: &Piece) -> std::ops::Range<usize> {
-        let from = self.parts.partition_point(|part| part.piece.x1 <= piece.x0 + SAME_MM);
-        let to = self.parts.partition_point(|part| part.piece.x0 < piece.x1 - SAME_MM);
-        from..to.max(from)
     }
 
     /// By how much the run rises above a curve at the most, mm: a bound, not more.
@@ -114,14 +111,28 @@ impl Chain {
         [self.runs.first().map_or(0.0, |run| run.x0()), self.runs.last().map_or(0.0, |run| run.x1())]
     }
 
+    /// How many runs it shares with another one at its begin and at its end.
+    fn shared_with(&self, other: &Self) -> [usize; 2] {
+        let (own, its) = (&self.runs, &other.runs);
+        let count = own.len().min(its.len());
+        let head = (0..count).take_while(|&i| Arc::ptr_eq(&own[i], &its[i])).count();
+        let is_shared = |i: &usize| Arc::ptr_eq(&own[own.len() - 1 - i], &its[its.len() - 1 - i]);
+        [head, (0..count - head).take_while(is_shared).count()]
+    }
+
+    /// Becomes what another one is; what they share stays.
+    pub(crate) fn become_as(&mut self, other: &Self) {
+        let [head, tail] = self.shared_with(other);
+        let (own, its) = (head..self.runs.len() - tail, head..other.runs.len() - tail);
+        self.runs.splice(own, other.runs[its].iter().cloned());
+        self.highest_mm.clone_from(&other.highest_mm);
+    }
+
     /// Where it is no longer what another one is, from the first such place to the last, mm; none where both are one. What they share
     /// is not looked at.
     pub(crate) fn differs_from(&self, other: &Self) -> Option<[f64; 2]> {
-        let count = self.runs.len().min(other.runs.len());
+        let [head, tail] = self.shared_with(other);
         let (own, its) = (&self.runs, &other.runs);
-        let head = (0..count).take_while(|&i| Arc::ptr_eq(&own[i], &its[i])).count();
-        let tail =
-            (0..count - head).take_while(|&i| Arc::ptr_eq(&own[own.len() - 1 - i], &its[its.len() - 1 - i])).count();
         let left = |runs: &[Arc<Run>]| -> Vec<Piece> {
             runs[head..runs.len() - tail].iter().flat_map(|run| &run.parts).map(|part| part.piece).collect()
         };
@@ -177,14 +188,23 @@ impl Chain {
 
     /// How deep a curve lies in the work at the most, mm; below 0 it stays clear by so much.
     pub(crate) fn depth(&mut self, piece: &Piece) -> f64 {
-        let mut deepest = f64::NEG_INFINITY;
         let first = self.run_behind(piece.x0 + SAME_MM);
-        for run in self.runs[first..].iter().take_while(|run| run.x0() < piece.x1 - SAME_MM) {
+        let count = self.runs[first..].partition_point(|run| run.x0() < piece.x1 - SAME_MM);
+        let highest_mm = self.highest();
+        let mut deepest = f64::NEG_INFINITY;
+        // An edge only rises away from its tip: where it is far above all work, nothing behind is looked at.
+        let falls = matches!(piece.curve, Curve::Line { slope, .. } if slope < 0.0);
+        for i in 0..count {
+            let run = &self.runs[first + if falls { count - 1 - i } else { i }];
             self.looked_at += 1;
+            let nearest = if falls { run.x1().min(piece.x1) } else { run.x0().max(piece.x0) };
+            if matches!(piece.curve, Curve::Line { .. }) && highest_mm - piece.curve.at(nearest) <= deepest {
+                break;
+            }
             if run.above_at_most(piece) <= deepest {
                 continue;
             }
-            for part in &run.parts[run.overlapping(piece)] {
+            for part in &run.parts[overlapping(&run.parts, piece)] {
                 self.looked_at += 1;
                 let (a, b) = (part.piece.x0.max(piece.x0), part.piece.x1.min(piece.x1));
                 if part.piece.highest() - piece.lowest(a, b).max(0.0) <= deepest {
@@ -199,43 +219,58 @@ impl Chain {
         deepest
     }
 
-    /// Takes away what stands above a curve.
-    pub(crate) fn cut(&mut self, piece: &Piece, owner: usize) {
-        let mut at = self.run_behind(piece.x0 + SAME_MM);
-        while self.runs.get(at).is_some_and(|run| run.x0() < piece.x1 - SAME_MM) {
-            let run = &self.runs[at];
-            self.looked_at += 1;
-            if run.above_at_most(piece) <= -CONTACT_MM {
-                at += 1;
-                continue;
-            }
-            let range = run.overlapping(piece);
-            self.looked_at += range.len();
-            let mut made: Vec<Part> = Vec::with_capacity(range.len() + 4);
-            let mut is_changed = false;
-            for part in &run.parts[range.clone()] {
-                is_changed |= cut_part(part, piece, owner, &mut made);
-            }
-            if is_changed {
-                at = self.replace(at, range, &made);
-            }
-            at += 1;
+    /// Takes away what stands above curves.
+    pub(crate) fn cut(&mut self, pieces: &[Piece], owner: usize) {
+        let highest_mm = self.highest() + BESIDE_MM;
+        let reaching: Vec<Piece> = pieces.iter().map(|piece| piece.below(highest_mm)).collect();
+        // A run is written anew once for all of them, and stays short enough for that.
+        for some in reaching.chunks(MOST) {
+            self.cut_some(some, owner);
         }
     }
 
-    /// Puts parts of a run in the place of others; those that are one with their neighbour become one. Gives the last run
+    fn cut_some(&mut self, pieces: &[Piece], owner: usize) {
+        let (from, to) = pieces
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(from, to), piece| (from.min(piece.x0), to.max(piece.x1)));
+        let mut at = self.run_behind(from + SAME_MM);
+        let mut made: Vec<Part> = Vec::new();
+        while let Some(run) = self.runs.get(at).filter(|run| run.x0() < to - SAME_MM).cloned() {
+            let mut parts: Option<Vec<Part>> = None;
+            for piece in pieces.iter().filter(|piece| run.x1() > piece.x0 + SAME_MM && run.x0() < piece.x1 - SAME_MM) {
+                self.looked_at += 1;
+                if run.above_at_most(piece) <= -CONTACT_MM {
+                    continue;
+                }
+                let own = parts.as_deref().unwrap_or(&run.parts);
+                let range = overlapping(own, piece);
+                self.looked_at += range.len();
+                made.clear();
+                let mut is_changed = false;
+                for part in &own[range.clone()] {
+                    is_changed |= cut_part(part, piece, owner, &mut made);
+                }
+                if is_changed {
+                    parts.get_or_insert_with(|| run.parts.clone()).splice(range, made.drain(..));
+                }
+            }
+            at = 1 + parts.map_or(at, |parts| self.replace(at, &parts));
+        }
+    }
+
+    /// Puts parts in the place of those of a run; those that are one with their neighbour become one. Gives the last run
     /// that has any of them.
-    fn replace(&mut self, at: usize, range: std::ops::Range<usize>, made: &[Part]) -> usize {
+    fn replace(&mut self, at: usize, parts: &[Part]) -> usize {
         self.highest_mm = OnceLock::new();
-        let run = &self.runs[at];
-        let mut joined: Vec<Part> = Vec::with_capacity(run.parts.len() + made.len());
-        let (before, behind) = (&run.parts[..range.start], &run.parts[range.end..]);
-        before.iter().chain(made).chain(behind).for_each(|part| join(&mut joined, part));
+        let mut joined: Vec<Part> = Vec::with_capacity(parts.len());
+        parts.iter().for_each(|part| join(&mut joined, part));
         if joined.len() > MOST {
-            let behind = joined.split_off(joined.len() / 2);
-            self.runs[at] = Arc::new(Run::of(joined));
-            self.runs.insert(at + 1, Arc::new(Run::of(behind)));
-            return at + 1;
+            let count = joined.len().div_ceil(MOST);
+            let runs: Vec<Arc<Run>> =
+                joined.chunks(joined.len().div_ceil(count)).map(|run| Arc::new(Run::of(run.to_vec()))).collect();
+            let last = at + runs.len() - 1;
+            self.runs.splice(at..=at, runs);
+            return last;
         }
         self.runs[at] = Arc::new(Run::of(joined));
         let is_few = |pair: &[Arc<Run>]| pair.iter().map(|run| run.parts.len()).sum::<usize>() <= FEW;
@@ -278,6 +313,13 @@ impl Chain {
             left = run.parts.last().map(|part| part.piece);
         }
     }
+}
+
+/// Which of some parts a curve lies over or under.
+fn overlapping(parts: &[Part], piece: &Piece) -> std::ops::Range<usize> {
+    let from = parts.partition_point(|part| part.piece.x1 <= piece.x0 + SAME_MM);
+    let to = parts.partition_point(|part| part.piece.x0 < piece.x1 - SAME_MM);
+    from..to.max(from)
 }
 
 /// Adds a part, to the last one where it goes on as that does.

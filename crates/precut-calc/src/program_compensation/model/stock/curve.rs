@@ -97,6 +97,17 @@ impl Piece {
         }
     }
 
+    /// As much of it as lies below a radius, of a straight one; any other is as it is.
+    pub(crate) fn below(&self, radius_mm: f64) -> Self {
+        let Curve::Line { x, r, slope } = self.curve else { return *self };
+        let reached = x + (radius_mm - r) / slope;
+        match slope {
+            _ if !reached.is_finite() => *self,
+            slope if slope > 0.0 => Self { x1: reached.clamp(self.x0, self.x1), ..*self },
+            _ => Self { x0: reached.clamp(self.x0, self.x1), ..*self },
+        }
+    }
+
     /// Length of its path, mm.
     pub(crate) fn length(&self) -> f64 {
         match self.curve {

@@ -381,11 +381,8 @@ impl Chain {
     }
 
     fn take_away(&mut self, swept: &Swept, owner: usize) {
-        for piece in &swept.pieces {
-            for above in above_axis(piece) {
-                self.cut(&above, owner);
-            }
-        }
+        let above: Vec<Piece> = swept.pieces.iter().flat_map(above_axis).collect();
+        self.cut(&above, owner);
         for &[x, from] in &swept.walls {
             self.touch_wall(x, from, owner);
         }
@@ -394,6 +391,9 @@ impl Chain {
 
 /// A piece where it is above the axis, and the axis where it is below.
 fn above_axis(piece: &Piece) -> Vec<Piece> {
+    if piece.lowest(piece.x0, piece.x1) >= 0.0 {
+        return vec![*piece];
+    }
     let axis = Curve::Line { x: 0.0, r: 0.0, slope: 0.0 };
     let mut at = vec![piece.x0, piece.x1];
     piece.curve.crossings(axis, 0.0, [piece.x0, piece.x1], &mut at);

@@ -3,8 +3,9 @@
 use crate::calculator::Failure;
 use crate::deflection_compensation::ToolPlace;
 
-use super::super::stock::{Chain, Way};
-use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
+use super::super::stock::Way;
+use super::cut::{AXIS_MM, CutPlace, Cutting, Kept, Pace};
+use super::near::Near;
 
 /// Places stand no farther apart than this at first, mm.
 const APART_MM: f64 = 5.0;
@@ -46,12 +47,18 @@ pub(super) struct Along<'a> {
     pub(super) so_far: SoFar,
     pub(super) move_pace: Pace,
     pub(super) straight_mm: f64,
+    /// Shares at which it is looked at, and no others; none where they are to be found.
+    pub(super) shares: Vec<f64>,
 }
 
 impl Along<'_> {
     /// Places, so close that between them the path is straight.
     pub(super) fn places(&self) -> Result<Vec<CutPlace>, Failure> {
-        let mut places = self.at(&self.first_shares())?;
+        let mut kept = Kept::default();
+        if !self.shares.is_empty() {
+            return self.at(&self.shares, &[], &mut kept);
+        }
+        let mut places = self.at(&self.first_shares(), &[], &mut kept)?;
         // Whether what lies behind a place may still be bent.
         let mut is_open = vec![true; places.len()];
         let nearest = NEAREST_MM / self.way.length_mm();
@@ -63,19 +70,20 @@ impl Along<'_> {
                 break;
             }
             let shares: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].share + places[i].share)).collect();
-            let found = self.at(&shares)?;
+            let guesses: Vec<f64> = wanted.iter().map(|&i| 0.5 * (places[i - 1].lift_mm + places[i].lift_mm)).collect();
+            let found = self.at(&shares, &guesses, &mut kept)?;
             let (mut laid, mut open) = (Vec::new(), Vec::new());
             let mut next = wanted.iter().zip(&found).peekable();
             for (i, place) in places.iter().enumerate() {
-                if let Some((_, between)) = next.next_if(|(at, _)| **at == i) {
+                if let Some((_, inside)) = next.next_if(|(at, _)| **at == i) {
                     let before: &CutPlace = &places[i - 1];
-                    let off = |of: fn(&CutPlace) -> f64| of(between) - 0.5 * (of(before) + of(place));
+                    let off = |of: fn(&CutPlace) -> f64| of(inside) - 0.5 * (of(before) + of(place));
                     let off = off(|place| place.lift_mm).abs().max(off(|place| place.wanted_mm).abs());
                     let bent = off > self.straight_mm;
                     if let Some(last) = open.last_mut() {
                         *last = bent;
                     }
-                    laid.push(*between);
+                    laid.push(*inside);
                     open.push(bent);
                 }
                 laid.push(*place);
@@ -100,7 +108,7 @@ impl Along<'_> {
         if let Way::Line(..) = self.way
             && high - low > NEAREST_MM
         {
-            let stock: &Chain = self.cutting.nominal;
+            let stock: &Near<'_> = &self.cutting.nominal;
             let steps = stock.parts_between(low, high).flat_map(|part| [part.piece.x0, part.piece.x1]);
             for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
                 shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
@@ -121,7 +129,8 @@ impl Along<'_> {
         shares
     }
 
-    fn at(&self, shares: &[f64]) -> Result<Vec<CutPlace>, Failure> {
+    /// What happens at shares, near lifts that are guessed, or those of the place before.
+    fn at(&self, shares: &[f64], guesses_mm: &[f64], kept: &mut Kept) -> Result<Vec<CutPlace>, Failure> {
         let whole = after(self.so_far, self.way, self.move_pace);
         let between = |from: f64, to: f64, share: f64| from + share * (to - from);
         let place = |&share: &f64| {
@@ -136,6 +145,12 @@ impl Along<'_> {
         };
         let places: Vec<ToolPlace> = shares.iter().map(place).collect();
         let gaps = self.cutting.held.gaps(&places)?;
-        Ok(shares.iter().enumerate().map(|(i, &share)| self.cutting.at((share, self.from), &gaps, i)).collect())
+        let mut found: Vec<CutPlace> = Vec::with_capacity(shares.len());
+        for (i, &share) in shares.iter().enumerate() {
+            let before = found.last().map_or(0.0, |place| place.lift_mm);
+            let guess_mm = guesses_mm.get(i).copied().unwrap_or(before);
+            found.push(self.cutting.at((share, self.from), (&gaps, i), guess_mm, kept));
+        }
+        Ok(found)
     }
 }

@@ -85,7 +85,7 @@ fn along_part(part: &Part, line: usize, real: &[Part], into: &mut Vec<ContourErr
 }
 
 /// Radius of an outline at a place, mm.
-fn radius_at(parts: &[Part], x: f64) -> f64 {
+pub(crate) fn radius_at(parts: &[Part], x: f64) -> f64 {
     let at = parts.partition_point(|part| part.piece.x1 < x).min(parts.len().saturating_sub(1));
     parts.get(at).map_or(0.0, |part| part.piece.curve.at(x))
 }

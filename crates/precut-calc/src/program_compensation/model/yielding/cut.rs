@@ -1,18 +1,24 @@
 //! The equilibrium at a place of a move: the tool is pushed off until the chip that is left pushes no harder (`program/4.7`).
 
+use std::borrow::Cow;
+
 use crate::deflection_compensation::{Gaps, Held, Opening, Planned, Push};
 use crate::force::{Component, DepthLaw, ForceModel};
 
 use super::super::super::job::ProgramTool;
 use super::super::reader::{Feed, Speed};
-use super::super::stock::{Chain, Stroke};
+use super::super::stock::Stroke;
 use super::aim::Aim;
+use super::near::Near;
 use super::outline::{Engaged, Outline};
 
 /// Steps to the equilibrium at the most: halving alone needs fewer.
 const MOST_STEPS: u32 = 80;
 /// How closely it is solved, mm.
 const SOLVED_MM: f64 = 1e-8;
+/// Steps from a guess before both sides are looked for, and the least by which what is left of a lift has to grow with it there, 1.
+const SECANT_STEPS: u32 = 5;
+const LEAST_SLOPE: f64 = 0.3;
 /// Nothing is said of cuts nearer to the axis, mm on the radius.
 pub(crate) const AXIS_MM: f64 = 1.0;
 
@@ -107,8 +113,8 @@ pub(crate) struct Cutting<'a> {
     /// Whether it is told what the cut asks of machine and edge.
     pub(crate) with_loads: bool,
     /// The work before the move: as it would be, did nothing yield, and as it is.
-    pub(crate) nominal: &'a Chain,
-    pub(crate) real: &'a Chain,
+    pub(crate) nominal: Near<'a>,
+    pub(crate) real: Near<'a>,
     /// Whether the move goes on where the last one stopped cutting.
     pub(crate) goes_on: bool,
     /// Whether the surface comes out as it is meant: then the depth is that at the place that is meant.
@@ -127,22 +133,37 @@ struct Loaded<'a> {
 /// A law that may depend on the speed, which follows the diameter.
 struct Law<'a> {
     held: &'a Held,
-    force: ForceModel,
-    z_mm: f64,
-    feed_mm_per_rev: f64,
+    kept: &'a KeptLaw,
     rpm: f64,
-    /// Where the speed changes nothing.
-    fixed: Option<DepthLaw>,
 }
 
 impl Law<'_> {
-    fn at(&self, outer_radius_mm: f64) -> DepthLaw {
-        if let Some(law) = &self.fixed {
-            return law.clone();
+    fn at(&self, outer_radius_mm: f64) -> Cow<'_, DepthLaw> {
+        if let Some(law) = &self.kept.fixed {
+            return Cow::Borrowed(law);
         }
+        let KeptLaw { force, z_mm, feed_mm_per_rev, .. } = self.kept;
         let speed = 2.0 * std::f64::consts::PI * outer_radius_mm.max(AXIS_MM) * self.rpm / 1000.0;
-        self.held.law(&self.force, self.z_mm, self.feed_mm_per_rev, speed)
+        Cow::Owned(self.held.law(force, *z_mm, *feed_mm_per_rev, speed))
     }
+}
+
+/// What one place of a move takes over from the one before.
+#[derive(Default)]
+pub(crate) struct Kept {
+    law: Option<KeptLaw>,
+    /// By how much what is left of a lift over the one that it makes grows with it, 1; 0 before it is known.
+    slope: f64,
+}
+
+/// A force law at an angle of the edge and a feed.
+struct KeptLaw {
+    lead: f64,
+    feed_mm_per_rev: f64,
+    z_mm: f64,
+    force: ForceModel,
+    /// Where the speed changes nothing.
+    fixed: Option<DepthLaw>,
 }
 
 impl Loaded<'_> {
@@ -192,7 +213,7 @@ impl Cutting<'_> {
         let length_mm = self.stroke.way.length_mm();
         let Some(outline) = self.outline(0.0).filter(|_| self.goes_on && length_mm > 0.0) else { return 0.0 };
         let beyond = self.stroke.way.at((BEYOND_MM / length_mm).min(1.0));
-        let depth_mm = outline.engaged(self.real, beyond).depth_mm;
+        let depth_mm = outline.engaged(&self.real, beyond).depth_mm;
         let lean = (outline.lead - std::f64::consts::FRAC_PI_2).clamp(0.0, STEEPEST_RAD).tan();
         ((depth_mm * lean + ON_MM) / length_mm).min(1.0)
     }
@@ -205,7 +226,7 @@ impl Cutting<'_> {
         let way = &self.stroke.way;
         let radius_mm = way.at(share)[1];
         let pace = Pace { feed: self.stroke.one.feed, speed: self.stroke.one.speed };
-        let depth_of = |outline: Outline| outline.engaged(self.nominal, way.at(share.max(from))).depth_mm;
+        let depth_of = |outline: Outline| outline.engaged(&self.nominal, way.at(share.max(from))).depth_mm;
         Planned {
             depth_mm: self.outline(share).map_or(0.0, depth_of),
             feed_mm_per_rev: pace.feed_mm_per_rev(radius_mm).unwrap_or(0.0),
@@ -218,8 +239,31 @@ impl Cutting<'_> {
         self.aim.filter(|_| self.is_corrected).map_or(0.0, |aim| aim.off_mm(self.stroke, share))
     }
 
-    /// What happens at a share of the move, at the depth that is met from `from` on; `place` is its number among those of the gaps.
-    pub(crate) fn at(&self, (share, from): (f64, f64), gaps: &Gaps, place: usize) -> CutPlace {
+    /// The force law at an angle of the edge: that of the place before, where nothing changes it.
+    fn law<'k>(&self, kept: &'k mut Option<KeptLaw>, lead: f64, feed_mm_per_rev: f64, z_mm: f64) -> &'k KeptLaw {
+        let same = |a: f64, b: f64| a.to_bits() == b.to_bits();
+        let is_as_before = |kept: &KeptLaw| {
+            let at_place = self.held.is_same_everywhere() || same(kept.z_mm, z_mm);
+            same(kept.lead, lead) && same(kept.feed_mm_per_rev, feed_mm_per_rev) && at_place
+        };
+        let known = kept.take().filter(is_as_before);
+        kept.insert(known.unwrap_or_else(|| {
+            let force = force_of(self.force, self.stroke.tool, lead);
+            let of_speed = force.depends_on_speed() || self.held.depends_on_speed();
+            let fixed = (!of_speed).then(|| self.held.law(&force, z_mm, feed_mm_per_rev, 100.0));
+            KeptLaw { lead, feed_mm_per_rev, z_mm, force, fixed }
+        }))
+    }
+
+    /// What happens at a share of the move, at the depth that is met from `from` on; `place` is its number among those of the gaps,
+    /// `guess_mm` a lift near that there.
+    pub(crate) fn at(
+        &self,
+        (share, from): (f64, f64),
+        (gaps, place): (&Gaps, usize),
+        guess_mm: f64,
+        kept: &mut Kept,
+    ) -> CutPlace {
         let [z_mm, radius_mm] = self.stroke.way.at(share);
         let compliance_mm_per_n = gaps.compliance_mm_per_n(place);
         let still = CutPlace {
@@ -244,23 +288,21 @@ impl Cutting<'_> {
             return CutPlace { lift_mm: 0.0, ..still };
         }
         let [met_z_mm, met_radius_mm] = self.stroke.way.at(share.max(from));
-        let nominal_depth_mm = outline.engaged(self.nominal, [met_z_mm, met_radius_mm]).depth_mm;
-        let force = force_of(self.force, self.stroke.tool, outline.lead);
+        let nominal_depth_mm = outline.engaged(&self.nominal, [met_z_mm, met_radius_mm]).depth_mm;
         let rpm = pace.rpm(radius_mm).unwrap_or(1.0);
-        let of_speed = force.depends_on_speed() || self.held.depends_on_speed();
-        let fixed = (!of_speed).then(|| self.held.law(&force, z_mm, feed_mm_per_rev, 100.0));
-        let law = Law { held: self.held, force, z_mm, feed_mm_per_rev, rpm, fixed };
+        let law = Law { held: self.held, kept: self.law(&mut kept.law, outline.lead, feed_mm_per_rev, z_mm), rpm };
         let loaded = Loaded { outline, law, with_main: self.with_main };
         let at = |lift: f64| {
-            let engaged = outline.engaged(self.real, [met_z_mm, met_radius_mm + lift]);
+            let engaged = outline.engaged(&self.real, [met_z_mm, met_radius_mm + lift]);
             let push = loaded.push(engaged);
             (lift_mm(radius_mm, gaps.opening(place, push)), engaged.depth_mm, push.radial_n)
         };
         let wanted_mm = still.wanted_mm;
-        let (lift_mm, depth_mm, radial_force_n) = if self.is_corrected { at(wanted_mm) } else { equilibrium(at) };
+        let (lift_mm, depth_mm, radial_force_n) =
+            if self.is_corrected { at(wanted_mm) } else { equilibrium(at, guess_mm, &mut kept.slope) };
         let load = (self.with_loads && depth_mm > 0.0).then(|| {
             let lift = if self.is_corrected { wanted_mm } else { lift_mm };
-            let engaged = outline.engaged(self.real, [met_z_mm, met_radius_mm + lift]);
+            let engaged = outline.engaged(&self.real, [met_z_mm, met_radius_mm + lift]);
             loaded.load(engaged, feed_mm_per_rev, rpm)
         });
         CutPlace { load, nominal_depth_mm, depth_mm, lead_rad: outline.lead, radial_force_n, lift_mm, ..still }
@@ -275,8 +317,29 @@ fn lift_mm(radius_mm: f64, opening: Opening) -> f64 {
     (radius_mm + opening.y_mm).hypot(opening.z_mm) - radius_mm
 }
 
-/// The lift that makes itself: with the depth and the force there.
-fn equilibrium(at: impl Fn(f64) -> (f64, f64, f64)) -> (f64, f64, f64) {
+/// The lift that makes itself: with the depth and the force there. Near a guess, with how what is left of a lift grows with it at the
+/// place before, a few steps find it.
+fn equilibrium(at: impl Fn(f64) -> (f64, f64, f64), guess_mm: f64, slope: &mut f64) -> (f64, f64, f64) {
+    let mut state = at(guess_mm);
+    let mut last = (guess_mm, guess_mm - state.0);
+    for _ in 0..SECANT_STEPS {
+        if last.1.abs() <= SOLVED_MM {
+            return state;
+        }
+        let lift = last.0 - last.1 / if *slope > 0.0 { *slope } else { 1.0 };
+        state = at(lift);
+        let left = lift - state.0;
+        let found = (left - last.1) / (lift - last.0);
+        if found < LEAST_SLOPE || left.abs() > 0.5 * last.1.abs() {
+            break;
+        }
+        (*slope, last) = (found, (lift, left));
+    }
+    bracketed(at)
+}
+
+/// The same from none: between two lifts of which one is too small and one too large.
+fn bracketed(at: impl Fn(f64) -> (f64, f64, f64)) -> (f64, f64, f64) {
     let first = at(0.0);
     if first.0.abs() <= SOLVED_MM {
         return first;

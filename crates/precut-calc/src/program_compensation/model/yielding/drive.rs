@@ -12,6 +12,7 @@ use super::super::stock::{Chain, Part, Shape, Stroke, Way, blank, strokes};
 use super::aim::Aim;
 use super::along::{Along, SoFar, after};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Pace};
+use super::near::Near;
 use super::sections::{Lumps, slices};
 
 /// Why a program is not driven over a blank that yields.
@@ -59,6 +60,18 @@ pub(crate) struct Driven<'a> {
     pub(crate) bends_as: Option<&'a Instead>,
     /// A drive of a program that is no other one before its first line of the contour: it need not be driven again until there.
     pub(crate) goes_on: Option<&'a Yielded>,
+    /// A drive of the same moves at whose places they are looked at: what comes of a small change is then as smooth as the model.
+    pub(crate) places_of: Option<&'a Yielded>,
+}
+
+/// No move.
+static NO_MOVES: BTreeSet<usize> = BTreeSet::new();
+
+impl<'a> Driven<'a> {
+    /// As moves are, with the lines that make the contour.
+    pub(crate) fn as_it_is(finishing: &'a [usize]) -> Self {
+        Self { finishing, corrected: &NO_MOVES, bends_as: None, goes_on: None, places_of: None }
+    }
 }
 
 /// Ways of a tool instead of those of moves, by the moves.
@@ -149,7 +162,7 @@ struct Meant {
 impl Meant {
     /// Comes to the next move.
     fn come_to(&mut self, stroke: &Stroke<'_>, bends_as: Option<&Instead>) {
-        self.before.clone_from(&self.after);
+        self.before.become_as(&self.after);
         match bends_as.and_then(|ways| ways.get(&stroke.index)) {
             Some(ways) => ways.iter().for_each(|(shape, way)| self.after.cut_along(shape, way, stroke.one.line)),
             None => self.after.cut_along(&stroke.shape, &stroke.way, stroke.one.line),
@@ -212,8 +225,8 @@ pub(crate) fn yielding(
             force: &holding.force,
             with_main: holding.tangential,
             with_loads: job.mode.kind.refeeds(),
-            nominal: &meant.before,
-            real,
+            nominal: Near::of(&meant.before, shape, way),
+            real: Near::of(real, shape, way),
             goes_on: *last_cut == stroke.index.checked_sub(1),
             is_corrected: driven.corrected.contains(&stroke.index),
             aim: aim.as_ref(),
@@ -221,7 +234,8 @@ pub(crate) fn yielding(
         let is_corrected = cutting.is_corrected;
         let straight_mm = STRAIGHT_MM[usize::from(driven.finishing.binary_search(&one.line).is_err())];
         let from = cutting.meets_from();
-        let along = Along { cutting, way, from, so_far: *so_far, move_pace, straight_mm };
+        let shares = driven.places_of.map_or_else(Vec::new, |before| before.shares(stroke.index));
+        let along = Along { cutting, way, from, so_far: *so_far, move_pace, straight_mm, shares };
         let mut places = along.places()?;
         pace.work(places.len() * WORK_OF_PLACE)?;
         if is_corrected && aim.is_none() {
@@ -309,6 +323,12 @@ impl State {
 }
 
 impl Yielded {
+    /// Shares of a move at which it was looked at; none where it was not.
+    fn shares(&self, mv: usize) -> Vec<f64> {
+        let first = self.places.partition_point(|of| of.mv < mv);
+        self.places[first..].iter().take_while(|of| of.mv == mv).map(|of| of.place.share).collect()
+    }
+
     /// The moves before its first line of the contour, as far as they are kept.
     pub(crate) fn moves_before_contour(&self) -> usize {
         self.start.as_ref().map_or(0, |start| start.index)

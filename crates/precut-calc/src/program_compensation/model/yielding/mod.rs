@@ -1,19 +1,20 @@
 //! What a program leaves of its blank where work and machine yield (`program/4`).
 //!
-//! `outline` (how much of the tool is in the stock) and `sections` (what bends) -> `cut` (the equilibrium at a place) -> `along` (the
-//! places of a move) -> `drive`
-//! (along every move, on what the moves before have left) -> `contour` (what comes out against what was meant). `aim` is the
-//! drawing, where that is meant. Beam, forces and effects are those of deflection compensation.
+//! `near` (the stock about a move) -> `outline` (how much of the tool is in it) and `sections` (what bends) -> `cut` (the equilibrium
+//! at a place) -> `along` (the places of a move) -> `drive` (along every move, on what the moves before have left) -> `contour` (what
+//! comes out against what was meant). `aim` is the drawing, where that is meant. Beam, forces and effects are those of deflection
+//! compensation.
 
 mod aim;
 mod along;
 mod contour;
 mod cut;
 mod drive;
+mod near;
 mod outline;
 mod sections;
 
 pub(crate) use aim::FARTHEST_MM;
-pub(crate) use contour::{ContourError, between, contour};
+pub(crate) use contour::{ContourError, between, contour, radius_at};
 pub(crate) use cut::{AXIS_MM, CutPlace, Load, Pace};
 pub(crate) use drive::{CLOSE_MM, CutMove, Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};

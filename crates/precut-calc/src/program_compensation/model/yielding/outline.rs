@@ -4,7 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::super::super::job::ProgramTool;
-use super::super::stock::{Chain, Curve, Shape};
+use super::super::stock::{Curve, Shape};
+use super::near::Near;
 
 /// The outline is laid so far ahead along the feed: what the move before has just made is not stock ahead, mm.
 const AHEAD_MM: f64 = 1e-6;
@@ -33,6 +34,9 @@ pub(crate) struct Outline {
     sense: f64,
     nose: f64,
     centre: [f64; 2],
+    /// Direction from the centre of the nose to where the edge begins, and which way the edge goes.
+    at_edge: [f64; 2],
+    along: [f64; 2],
 }
 
 /// What of an outline is in the stock.
@@ -65,6 +69,7 @@ impl Outline {
         }
         let sense = if normal[0] * feed[1] - normal[1] * feed[0] < 0.0 { -1.0 } else { 1.0 };
         let lead = if sense < 0.0 { from + FRAC_PI_2 + left } else { right - FRAC_PI_2 - from };
+        let at_edge = unit(from + sense * lead);
         (lead > FLAT && lead < PI).then_some(Self {
             feed,
             normal,
@@ -73,11 +78,13 @@ impl Outline {
             sense,
             nose: shape.nose,
             centre: shape.centre,
+            at_edge,
+            along: [-sense * at_edge[1], sense * at_edge[0]],
         })
     }
 
     /// What is in the stock with the programmed point at a place.
-    pub(crate) fn engaged(&self, stock: &Chain, [x, r]: [f64; 2]) -> Engaged {
+    pub(crate) fn engaged(&self, stock: &Near<'_>, [x, r]: [f64; 2]) -> Engaged {
         let centre = [x + self.centre[0] + AHEAD_MM * self.feed[0], r + self.centre[1] + AHEAD_MM * self.feed[1]];
         let tip = [centre[0] + self.nose * self.normal[0], centre[1] + self.nose * self.normal[1]];
         let mut placed = Placed::of(self, centre, stock);
@@ -114,7 +121,7 @@ fn normal(feed: [f64; 2], tip_direction: u8) -> Option<[f64; 2]> {
 }
 
 /// Radius of the stock over a place; none beside it.
-fn stock_at(stock: &Chain, x: f64) -> Option<f64> {
+fn stock_at(stock: &Near<'_>, x: f64) -> Option<f64> {
     let parts = stock.parts_between(x - FLAT, x + FLAT);
     parts.map(|part| part.piece.curve.at(x)).reduce(f64::max)
 }
@@ -135,12 +142,9 @@ struct Placed {
 }
 
 impl Placed {
-    fn of(outline: &Outline, centre: [f64; 2], stock: &Chain) -> Self {
-        let Outline { nose, from, sense, lead, .. } = *outline;
-        let last = from + sense * lead;
-        let at_edge = unit(last);
+    fn of(outline: &Outline, centre: [f64; 2], stock: &Near<'_>) -> Self {
+        let Outline { nose, from, sense, lead, at_edge, along, .. } = *outline;
         let edge = [centre[0] + nose * at_edge[0], centre[1] + nose * at_edge[1]];
-        let along = [-sense * at_edge[1], sense * at_edge[0]];
         let [first_x, last_x] = stock.ends();
         let mut length = LONGEST_MM;
         if along[1] > FLAT {
@@ -166,7 +170,7 @@ impl Placed {
     }
 
     /// Ends the outline where it has come above all stock that it reaches: what lies beyond is in none.
-    fn end_above(&mut self, stock: &Chain) {
+    fn end_above(&mut self, stock: &Near<'_>) {
         let ([low, high], _) = self.extent();
         let highest = stock.parts_between(low, high).map(|part| part.piece.highest()).fold(0.0, f64::max) + NEAR_MM;
         let of_nose = self.nose * self.lead;
@@ -217,7 +221,7 @@ impl Placed {
     }
 
     /// Lengths at which the outline may go into the stock or out of it.
-    fn crossings(&self, stock: &Chain, into: &mut Vec<f64>) {
+    fn crossings(&self, stock: &Near<'_>, into: &mut Vec<f64>) {
         let ([low, high], lowest) = self.extent();
         into.push(self.nose * self.lead);
         let mut found = Vec::with_capacity(2);
