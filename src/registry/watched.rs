@@ -16,13 +16,16 @@ use super::{Entry, second_line};
 /// The parts of a process one after another.
 type Replay = fn(Value, &dyn Monitor) -> Result<Replayed, NotReplayed>;
 
+/// A process as it was kept.
+type Resume = fn(Value, Value, Vec<Value>) -> Result<Box<dyn Watching>, NotReplayed>;
+
 /// How a process of a calculator is watched.
 pub(crate) struct Observed {
     pub(crate) replay: Replay,
     /// A process before its first part, by its document.
     pub(crate) begin: fn(Value) -> Result<Box<dyn Watching>, NotReplayed>,
     /// A process as it was kept, by its document, what was kept, and its parts since the first that is needed.
-    pub(crate) resume: fn(Value, Value, Vec<Value>) -> Result<Box<dyn Watching>, NotReplayed>,
+    pub(crate) resume: Resume,
     /// Every fault of a document and of some parts, in whatever order.
     pub(crate) faults: fn(Value, Vec<Value>) -> Vec<Finding>,
     /// The path that a result commands, as conditions of a part that is cut on it; nothing where it commands none.

@@ -248,6 +248,9 @@ pub(crate) struct Sampled {
 /// Margins of the real model at many points at once.
 pub(crate) type Real<'a> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<f64>, Failure> + 'a;
 
+/// The margin by a near model.
+pub(crate) type NearMargin<'a> = dyn Fn(&[f64]) -> f64 + 'a;
+
 /// The probability that the margin of a near model is above a number.
 pub(crate) type NearlyKept<'a> = dyn Fn(f64) -> Result<f64, Failure> + 'a;
 
@@ -256,7 +259,7 @@ impl Sampled {
     pub(crate) fn until(
         (enough, most): (f64, usize),
         (dimensions, effort): (usize, Effort),
-        (near, nearly): (&dyn Fn(&[f64]) -> f64, &NearlyKept<'_>),
+        (near, nearly): (&NearMargin<'_>, &NearlyKept<'_>),
         real: &mut Real<'_>,
     ) -> Result<Self, Failure> {
         let mut sampled = Self { points: std::array::from_fn(|_| Vec::new()) };
@@ -281,12 +284,7 @@ impl Sampled {
     }
 
     /// The probability that the margin is above `least`; `nearly` is that of the near model.
-    pub(crate) fn kept(
-        &self,
-        least: f64,
-        near: &dyn Fn(&[f64]) -> f64,
-        nearly: &NearlyKept<'_>,
-    ) -> Result<Estimate, Failure> {
+    pub(crate) fn kept(&self, least: f64, near: &NearMargin<'_>, nearly: &NearlyKept<'_>) -> Result<Estimate, Failure> {
         let is = |kept: bool| f64::from(u8::from(kept));
         let both: Vec<Vec<(f64, f64)>> = self
             .points
@@ -305,7 +303,12 @@ impl Sampled {
             let own = &both[one];
             own.iter().map(|(real, near)| real + share * (exact - near)).sum::<f64>() / own.len().max(1) as f64
         });
-        Ok(Estimate::of(means))
+        // Where no point of so few was otherwise than expected one of the next may be (Laplace's rule).
+        let expected = |near: f64| if share > 0.0 { near } else { real.round() };
+        let otherwise = all.iter().filter(|(real, near)| (real - expected(*near)).abs() > 0.5).count();
+        let chance = (otherwise as f64 + 1.0) / (count + 2.0);
+        let found = Estimate::of(means);
+        Ok(Estimate { error: found.error.max(2.0 * (chance * (1.0 - chance) / count).sqrt()), ..found })
     }
 
     /// How often the real model was asked.
@@ -314,7 +317,7 @@ impl Sampled {
     }
 
     /// Variance of what the real margin is off the near one.
-    pub(crate) fn variance_off(&self, near: &dyn Fn(&[f64]) -> f64) -> f64 {
+    pub(crate) fn variance_off(&self, near: &NearMargin<'_>) -> f64 {
         let off: Vec<f64> = self.points.iter().flatten().map(|(g, margin)| margin - near(g)).collect();
         let mean = off.iter().sum::<f64>() / off.len().max(1) as f64;
         off.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / off.len().max(1) as f64

@@ -30,7 +30,7 @@ pub(crate) fn figure(all: &[Contribution], joint: &JointlyKept, labels: &[&'stat
         };
         (1..).zip(0..).zip(all).filter_map(bar).collect()
     };
-    let ends = [0.5, all.len() as f64 + 0.5];
+    let ends = [1.0, all.len() as f64];
     let line = |name, y: f64, role| Item::Line { name, x: ends.to_vec(), y: vec![Some(y); 2], role };
     let shares = bars(|one| one.share_of_variance);
     let mut halved = bars(|one| one.joint_probability_if_halved);
@@ -50,10 +50,12 @@ pub(crate) fn figure(all: &[Contribution], joint: &JointlyKept, labels: &[&'stat
 pub(crate) fn table(all: &[Contribution]) -> Table {
     let shares: Vec<Option<f64>> = all.iter().map(|one| one.share_of_variance).collect();
     let halved: Vec<Option<f64>> = all.iter().map(|one| one.joint_probability_if_halved).collect();
+    let ranks: Vec<f64> = (1_u32..).take(all.len()).map(f64::from).collect();
     let words = all.iter().map(|one| Cow::Owned(one.quantity.clone())).collect();
     Table {
         id: ID,
         columns: vec![
+            Column::numbers("rank", "1", &ranks),
             Column::words("quantity", words),
             Column::optional("share_of_variance", "1", &shares),
             Column::optional("joint_probability_if_halved", "1", &halved),

@@ -4,6 +4,7 @@
 //! are on record: they are looked at again.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -121,10 +122,10 @@ impl<M: Watched> Watch<M> {
         watch.memory = snapshot.memory;
         let mut looked = BTreeMap::new();
         for seen in snapshot.parts.iter().chain(&snapshot.open) {
-            if !looked.contains_key(&seen.part.number) {
+            if let Entry::Vacant(place) = looked.entry(seen.part.number) {
                 let part = seen.part.part::<M>(&on_record)?;
                 let sighting = watch.seen(&part, seen.ordinal, monitor)?;
-                looked.insert(seen.part.number, (part, sighting));
+                place.insert((part, sighting));
             }
         }
         let again = |seen: &Seen| {

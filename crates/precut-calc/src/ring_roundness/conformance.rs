@@ -1,5 +1,7 @@
 //! How probable it is that the ring comes out within its tolerance (`certainty/7.1`).
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -25,6 +27,7 @@ pub(super) const POINTER: &str = "/tolerance/roundness_um";
 const MOST_LINES: usize = 64;
 /// Most rings of one scrambling, and the error of the probability below which there are no more.
 const MOST_RINGS: usize = 32;
+const MOST_CUT: f64 = 8.0 * MOST_RINGS as f64;
 const ENOUGH: f64 = 0.01;
 /// Rings that are cut one after the other for an answer, as a rule: those of the surface, and half of all others.
 pub(super) const RINGS: f64 = 130.0;
@@ -86,6 +89,8 @@ struct Judged<'a> {
     limit_um: f64,
     of: Uncertainties<RingQuantity>,
     share: Share<'a>,
+    /// Rings that were cut beside those of the surface.
+    cut: AtomicUsize,
 }
 
 /// The block of the answer, of a checked job with a tolerance.
@@ -99,7 +104,7 @@ pub(super) fn conformance(
     let of = uncertainties(job)
         .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
     let blank_mm = scene.blank_mm(job, nodes(job) as usize).map_err(unevaluable)?;
-    let judged = Judged { job, scene, end, blank_mm, limit_um, of, share };
+    let judged = Judged { job, scene, end, blank_mm, limit_um, of, share, cut: AtomicUsize::new(0) };
     let surface = judged.surface()?;
     let near = |of: &Uncertainties<RingQuantity>, g: &[f64]| surface.at(&judged.coordinates(of, g))[0];
     let count = judged.of.of.len();
@@ -198,7 +203,8 @@ impl Judged<'_> {
                 let values = self.of.values(&g[..count]);
                 self.margin(&values, std::array::from_fn(|phase| g[count + phase]))
             })?);
-            self.report(SURFACE_SHARE + (1.0 - SURFACE_SHARE) * all.len() as f64 / points.len() as f64);
+            let cut = self.cut.fetch_add(some.len(), Ordering::Relaxed) + some.len();
+            self.report(SURFACE_SHARE + (1.0 - SURFACE_SHARE) * (cut as f64 / MOST_CUT).min(1.0));
         }
         Ok(all)
     }

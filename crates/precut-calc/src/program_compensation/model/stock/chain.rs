@@ -263,7 +263,9 @@ impl Chain {
     fn replace(&mut self, at: usize, parts: &[Part]) -> usize {
         self.highest_mm = OnceLock::new();
         let mut joined: Vec<Part> = Vec::with_capacity(parts.len());
-        parts.iter().for_each(|part| join(&mut joined, part));
+        for part in parts {
+            join(&mut joined, part);
+        }
         if joined.len() > MOST {
             let count = joined.len().div_ceil(MOST);
             let runs: Vec<Arc<Run>> =
