@@ -1,7 +1,9 @@
 //! Parts that a program made: what is hidden in what they measure is found, and nothing where nothing is hidden.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use precut_calc::calculator::{Answer, Calculator, Check, ForwardModel, Rows, Unwatched, Violations};
+use precut_calc::calculator::{
+    Answer, Calculator, Check, Failure, ForwardModel, PrepareError, Rows, Unwatched, Violations,
+};
 use precut_calc::deflection_compensation::DeflectionPoint;
 use precut_calc::diagnosis::{Diagnosis, DiagnosisResult, VerdictClass};
 use precut_calc::effects::DeflectionEffect;
@@ -163,4 +165,25 @@ fn without_forces_nothing_is_predicted() {
     OfPrograms::fill(&mut job);
     let failure = OfPrograms::run(&job, &Unwatched).unwrap_err();
     assert!(format!("{failure:?}").contains("prediction_without_force"), "{failure:?}");
+}
+
+/// A program that is not read is told where it stands: that of a part, or that of the job.
+#[test]
+fn a_program_that_is_not_read_is_told_where_it_stands() {
+    let job = example("slender_shaft");
+    let pointers = |base: &Value, run: ProgramRun| {
+        let rows = rows_along(vec![run]);
+        match ProgramCompensation::prepare(&parsed(base), &rows, "diameter_deviation_um", &Unwatched) {
+            Err(PrepareError::Failed(Failure::NotRead { findings, .. })) => {
+                findings.into_iter().map(|finding| finding.pointer).collect::<Vec<String>>()
+            }
+            _ => panic!("a program was read that has none"),
+        }
+    };
+    let wrong = "O1\nQQ 7\nM30\n".to_owned();
+    let run = ProgramRun { nc_program: Some(wrong.clone()), ..ProgramRun::default() };
+    assert_eq!(pointers(&job, run), ["/runs/0/nc_program"]);
+    let mut base = job;
+    base["nc_program"] = json!(wrong);
+    assert_eq!(pointers(&base, ProgramRun::default()), ["/job/nc_program"]);
 }

@@ -12,7 +12,8 @@ pub(crate) const ID: &str = "doubt";
 pub(crate) const LABEL_CODES: &[&str] =
     &["doubt", "doubt_rank", "doubt_share", "doubt_probability", "doubt_now", "doubt_wanted"];
 
-/// The picture; `labels` are those of the calculator's quantities, `doubt_` before their names. `None` where nothing is doubted.
+/// The picture; `labels` are those of the calculator's quantities, `doubt_` before their names. `None` where
+/// nothing is doubted, and where nobody asked what half of a width makes of it.
 pub(crate) fn figure(all: &[Contribution], joint: &JointlyKept, labels: &[&'static str]) -> Option<Figure> {
     let label = |one: &Contribution| {
         let is_own = |label: &&&str| label.strip_prefix("doubt_") == Some(one.quantity.as_str());
@@ -34,16 +35,17 @@ pub(crate) fn figure(all: &[Contribution], joint: &JointlyKept, labels: &[&'stat
     let line = |name, y: f64, role| Item::Line { name, x: ends.to_vec(), y: vec![Some(y); 2], role };
     let shares = bars(|one| one.share_of_variance);
     let mut halved = bars(|one| one.joint_probability_if_halved);
-    if !halved.is_empty() {
-        halved.push(line("doubt_now", joint.probability, Role::Before));
-        halved.push(line("doubt_wanted", joint.wanted, Role::Limit));
+    if halved.is_empty() {
+        return None;
     }
+    halved.push(line("doubt_now", joint.probability, Role::Before));
+    halved.push(line("doubt_wanted", joint.wanted, Role::Limit));
     let panels = [("doubt_share", shares), ("doubt_probability", halved)].into_iter().filter_map(|(label, items)| {
         (!items.is_empty()).then(|| Panel { y: Axis::linear(label, "1"), height: 1.0, items })
     });
     let panels: Vec<Panel> = panels.collect();
     let x = Axis::linear("doubt_rank", "1");
-    (!panels.is_empty()).then(|| Figure { id: ID, title: Message::new("doubt"), frame: Frame::Stacked, x, panels })
+    Some(Figure { id: ID, title: Message::new("doubt"), frame: Frame::Stacked, x, panels })
 }
 
 /// The same as a table.
@@ -55,7 +57,7 @@ pub(crate) fn table(all: &[Contribution]) -> Table {
     Table {
         id: ID,
         columns: vec![
-            Column::numbers("rank", "1", &ranks),
+            Column::numbers("place", "1", &ranks),
             Column::words("quantity", words),
             Column::optional("share_of_variance", "1", &shares),
             Column::optional("joint_probability_if_halved", "1", &halved),

@@ -201,6 +201,16 @@ impl PreparedProgram {
     }
 }
 
+/// Faults of a program, told where it stands in what is asked.
+fn failed_at(failure: Failure, place: &str) -> PrepareError {
+    PrepareError::Failed(match failure {
+        Failure::NotRead { findings, total } => {
+            Failure::NotRead { findings: findings.into_iter().map(|finding| finding.under(place)).collect(), total }
+        }
+        other => other,
+    })
+}
+
 impl ForwardModel for ProgramCompensation {
     type Job = Job;
     type Run = ProgramRun;
@@ -239,15 +249,16 @@ impl ForwardModel for ProgramCompensation {
         let places: Vec<(usize, f64)> = rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect();
         let of_runs = rows.runs.iter().map(ProgramRun::conditions).collect();
         let causes = PreparedDeflection::of_causes(holding.work(), of_runs, places.clone(), measure);
-        let failed = PrepareError::Failed;
-        let given = PreparedRun::of(job.clone(), monitor).map_err(failed)?;
+        let given = PreparedRun::of(job.clone(), monitor).map_err(|failure| failed_at(failure, "/job"))?;
         let mut runs = Vec::new();
         for (k, conditions) in rows.runs.iter().enumerate() {
             let own = || places.iter().enumerate().filter(move |(_, (run, _))| *run == k);
             if own().next().is_none() {
                 continue;
             }
-            let mut run = PreparedRun::of(conditions.job(job), monitor).map_err(failed)?;
+            let place = if conditions.nc_program.is_some() { format!("/runs/{k}") } else { "/job".to_owned() };
+            let run = PreparedRun::of(conditions.job(job), monitor);
+            let mut run = run.map_err(|failure| failed_at(failure, &place))?;
             (run.rows, run.z_mm) = own().map(|(row, (_, z))| (row, *z)).unzip();
             runs.push(run);
         }
