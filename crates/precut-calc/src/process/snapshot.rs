@@ -22,6 +22,8 @@ use crate::calculator::{Failure, Monitor, Watched};
 pub struct Snapshot {
     /// Rises where a process remembers something else, or judges otherwise by it.
     version: u32,
+    /// Version of the calculator by which the parts were judged.
+    calculator: u32,
     memory: Memory,
     /// The parts in memory, and those whose account is open.
     parts: Vec<Seen>,
@@ -97,6 +99,7 @@ impl<M: Watched> Watch<M> {
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
             version: VERSION,
+            calculator: M::META.version,
             memory: self.memory.clone(),
             parts: self.memory.parts.iter().map(|(sighting, _)| Seen::of(sighting)).collect(),
             open: self.account.open.iter().map(|cut| Seen::of(&cut.sighting)).collect(),
@@ -114,7 +117,7 @@ impl<M: Watched> Watch<M> {
         parts: &[PartOf<M>],
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
-        if snapshot.version != VERSION {
+        if (snapshot.version, snapshot.calculator) != (VERSION, M::META.version) {
             return Err(Failure::Internal("a process kept by another version".to_owned()));
         }
         let on_record: BTreeMap<u32, &PartOf<M>> = parts.iter().map(|part| (part.number, part)).collect();
