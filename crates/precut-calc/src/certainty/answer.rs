@@ -130,6 +130,14 @@ pub struct Contribution {
     pub joint_probability_if_halved: Option<f64>,
 }
 
+impl Contribution {
+    /// The largest share first; where none has a share, what would help most.
+    pub(crate) fn sort(all: &mut [Self]) {
+        let of = |one: &Self| one.share_of_variance.or(one.joint_probability_if_halved);
+        all.sort_by(|a, b| of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+}
+
 /// Something to do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]

@@ -16,7 +16,7 @@ use crate::calculator::{Failure, Monitor, checkpoint};
 use super::{normal_below, normal_quantile};
 
 /// Independent scramblings; their spread is the error.
-const SCRAMBLINGS: usize = 8;
+pub(crate) const SCRAMBLINGS: usize = 8;
 /// Lines of a scrambling at first: of the near model, and of the real one.
 const FIRST_LINES: [usize; 2] = [8, 2];
 /// Points of a scrambling at which a model is asked at first that costs much.

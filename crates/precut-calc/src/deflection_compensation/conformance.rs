@@ -393,10 +393,7 @@ impl<'a> Judged<'a> {
                 joint_probability_if_halved: Some(told(&self.uncertainties.halved(index))?),
             });
         }
-        contributions.sort_by(|a, b| {
-            let of = |one: &Contribution| one.share_of_variance.or(one.joint_probability_if_halved);
-            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
-        });
+        Contribution::sort(&mut contributions);
         let common = self.common_share();
         let probability = bounded(joint.probability);
         Ok(Conformance {

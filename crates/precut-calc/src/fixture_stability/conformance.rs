@@ -329,10 +329,7 @@ impl<'a> There<'a> {
                 joint_probability_if_halved: halved,
             });
         }
-        all.sort_by(|a, b| {
-            let of = |one: &Contribution| one.share_of_variance.or(one.joint_probability_if_halved);
-            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
-        });
+        Contribution::sort(&mut all);
         Ok(all)
     }
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, checkpoint};
-use crate::certainty::lines::{Effort, Estimate, Question, Sampled};
+use crate::certainty::lines::{Effort, Estimate, Question, SCRAMBLINGS, Sampled};
 use crate::certainty::{
     Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties, WidthUnit, bounded,
     normal_below,
@@ -15,6 +15,7 @@ use crate::certainty::{
 use super::causes::nodes;
 use super::input::Job;
 use super::scene::Scene;
+use super::search_wide::turned_nodes;
 use super::simulate::{Share, or_none, side_by_side};
 use super::stance::Stance;
 use super::surface::{roundness_um, unevaluable};
@@ -27,7 +28,7 @@ pub(super) const POINTER: &str = "/tolerance/roundness_um";
 const MOST_LINES: usize = 64;
 /// Most rings of one scrambling, and the error of the probability below which there are no more.
 const MOST_RINGS: usize = 32;
-const MOST_CUT: f64 = 8.0 * MOST_RINGS as f64;
+const MOST_CUT: f64 = (SCRAMBLINGS * MOST_RINGS) as f64;
 const ENOUGH: f64 = 0.01;
 /// Rings that are cut one after the other for an answer, as a rule: those of the surface, and half of all others.
 pub(super) const RINGS: f64 = 130.0;
@@ -267,10 +268,7 @@ impl Judged<'_> {
             share_of_variance: share(off),
             joint_probability_if_halved: None,
         });
-        all.sort_by(|a, b| {
-            let of = |one: &Contribution| one.share_of_variance.or(one.joint_probability_if_halved);
-            of(b).partial_cmp(&of(a)).unwrap_or(std::cmp::Ordering::Equal)
-        });
+        Contribution::sort(&mut all);
         Ok(all)
     }
 }
@@ -296,12 +294,7 @@ fn value_at(quantity: RingQuantity, distribution: &crate::certainty::Distributio
     if quantity.unit() == WidthUnit::Percent { place.exp() } else { place }
 }
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of n")]
-fn turned_nodes(share: f64, n: usize) -> usize {
-    ((share * n as f64) as usize).min(n - 1)
-}
-
-/// What is said of it.
+/// What the answer says of it.
 pub(super) fn said(found: &RingConformance) -> Message {
     let joint = &found.joint;
     let said = Message::new("probably_round")
@@ -317,7 +310,7 @@ pub(super) fn said(found: &RingConformance) -> Message {
     }
 }
 
-/// What is warned of.
+/// The warning where it is less probable than wanted.
 pub(super) fn warning(found: &RingConformance) -> Option<Finding> {
     let joint = &found.joint;
     (!joint.met).then(|| {

@@ -337,8 +337,9 @@ impl Wide<'_> {
     }
 }
 
+/// By how many of n nodes a ring is turned that is turned by a share of a turn.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of n")]
-fn turned_nodes(share: f64, n: usize) -> usize {
+pub(super) fn turned_nodes(share: f64, n: usize) -> usize {
     ((share * n as f64) as usize).min(n - 1)
 }
 
