@@ -14,6 +14,7 @@ mod http;
 mod library;
 mod measure;
 mod milling;
+mod process;
 mod program;
 mod ring;
 mod roundness;

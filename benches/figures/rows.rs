@@ -15,6 +15,7 @@ use crate::http::{self, Bare, Clock, Exchange};
 use crate::library;
 use crate::measure::{Measured, Unit, cpu_time};
 use crate::milling::{self, Teeth};
+use crate::process;
 use crate::program;
 use crate::ring;
 use crate::roundness;
@@ -198,6 +199,13 @@ pub(crate) fn all() -> Vec<Row> {
             us(100_000.0),
             || diagnosis::deflection(100),
         ),
+        row("a part of a watched process, twelve rows, one type", Unit::Time, us(1000.0), us(200.0), || {
+            process::part(1, 12)
+        }),
+        row("the same with 200 rows and three types", Unit::Time, us(5000.0), us(1000.0), || process::part(3, 200)),
+        row("a thousand parts of a watched process, twelve rows", Unit::Time, us(1e6), us(200_000.0), || {
+            process::replay(1, 12, 1000)
+        }),
         row("CSV, 10,000 rows of 8 numbers", Unit::Time, None, None, csv),
         row("G-code, 10,000 cuts", Unit::Time, None, None, gcode),
         row("SVG, 3 panels of 201 stations", Unit::Time, None, None, || svg(201)),

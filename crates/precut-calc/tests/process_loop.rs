@@ -3,9 +3,9 @@
 
 use crate::process_support::{Shop, draws, first_seed};
 use precut_calc::calculator::{Unwatched, Watched};
-use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionRun};
+use precut_calc::deflection_compensation::{DeflectionCompensation, DeflectionRun, Job};
 use precut_calc::effects::DeflectionEffect;
-use precut_calc::process::{ActionKind, GaugeCheck, Watch};
+use precut_calc::process::{ActionKind, GaugeCheck, Situation, Watch};
 use serde_json::json;
 
 /// The part with which something changes.
@@ -20,6 +20,8 @@ enum Controller {
     /// Takes a share of the last part's rows out of the next.
     Rows(f64),
     Ours,
+    /// Is told by the watch that something changed, and by us what.
+    Told,
 }
 
 /// What hides in a loop from the change on.
@@ -31,11 +33,12 @@ enum Hidden {
     Gauge(f64),
 }
 
-/// Of every part the mean square of its true deviation and its true form; paths that were issued.
+/// Of every part the mean square of its true deviation and its true form; paths that were issued; when a change was reported.
 struct Cut {
     squares: Vec<f64>,
     forms: Vec<f64>,
     paths: usize,
+    reported: Option<u32>,
 }
 
 fn rms(squares: &[f64]) -> f64 {
@@ -62,7 +65,7 @@ fn cut(controller: Controller, hidden: &Hidden, moves: Moves, seed: u64, count: 
     let start = shop.template.conditions.clone();
     let mut run = DeflectionCompensation::compensated(&job, &start, &Unwatched).unwrap().unwrap();
     let mut watch = Watch::<DeflectionCompensation>::new(shop.document.clone());
-    let mut told = Cut { squares: Vec::new(), forms: Vec::new(), paths: 0 };
+    let mut told = Cut { squares: Vec::new(), forms: Vec::new(), paths: 0, reported: None };
     // What the controllers have taken out so far, at the rows.
     let mut taken = vec![0.0; shop.template.measurements.len()];
     let base = run.clone();
@@ -99,6 +102,14 @@ fn cut(controller: Controller, hidden: &Hidden, moves: Moves, seed: u64, count: 
                 }
             }
             Controller::Rows(share) => taken.iter_mut().zip(&rows).for_each(|(own, um)| *own += share * um),
+            Controller::Told => {
+                let state = watch.take(&part, &Unwatched).unwrap();
+                if acts && told.reported.is_none() && state.state == Situation::Changed {
+                    told.reported = Some(number);
+                    let known = Job { effects: effect, ..job.clone() };
+                    run = DeflectionCompensation::compensated(&known, &start, &Unwatched).unwrap().unwrap();
+                }
+            }
             Controller::Ours => {
                 watch.take(&part, &Unwatched).unwrap();
                 let Some(outlook) = watch.outlook(&Unwatched).unwrap() else { continue };
@@ -177,7 +188,7 @@ fn after_a_change_parts_are_good_again() {
     let gauge = [Hidden::Gauge(3.4)];
     let (controllers, changes): (Vec<Controller>, &[Hidden]) = if is_measured {
         let peers = [0.2, 0.4].into_iter().flat_map(|share| [Controller::Mean(share), Controller::Rows(share)]);
-        ([Controller::Fixed].into_iter().chain(peers).chain([Controller::Ours]).collect(), &changes)
+        ([Controller::Fixed].into_iter().chain(peers).chain([Controller::Told, Controller::Ours]).collect(), &changes)
     } else {
         (vec![Controller::Fixed, Controller::Ours], &changes[..1])
     };
@@ -189,17 +200,21 @@ fn after_a_change_parts_are_good_again() {
     {
         let mut after = Vec::new();
         for &controller in &controllers {
-            let (mut spans, mut paths) = ([Vec::new(), Vec::new(), Vec::new()], 0);
+            let (mut spans, mut paths, mut waits) = ([Vec::new(), Vec::new(), Vec::new()], 0, Vec::new());
             for (hidden, seed) in changes.iter().flat_map(|own| (0..count).map(move |seed| (own, seed))) {
                 let own = cut(controller, hidden, moves, first_of + seed, 120);
                 let ranges = [20..first, first..first + 10, first + 10..120];
                 spans.iter_mut().zip(ranges).for_each(|(span, range)| span.extend_from_slice(&own.squares[range]));
                 paths += own.paths;
+                waits.extend(own.reported.map(|part| f64::from(part + 1 - CHANGED)));
             }
             let [before, ten, then] = spans.map(|span| rms(&span));
             if is_measured {
                 let each = paths as f64 / (changes.len() as f64 * count as f64);
-                eprintln!("{name}, {moves:?}: | {controller:?} | {before:.2} | {ten:.2} | {then:.2} | {each:.1} |");
+                let wait = waits.iter().sum::<f64>() / waits.len().max(1) as f64;
+                eprintln!(
+                    "{name}, {moves:?}: | {controller:?} | {before:.2} | {ten:.2} | {then:.2} | {each:.1} | {wait:.1}"
+                );
             }
             after.push(then);
         }

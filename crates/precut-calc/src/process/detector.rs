@@ -37,7 +37,7 @@ pub(super) fn statistic(
     let weights: Vec<f64> = entries.iter().map(|entry| entry.log_weight).collect();
     let log_r = log_sum_exp(&weights);
     let first = parts.len().saturating_sub(SUSPECTS);
-    let alone: Vec<f64> = parts[first..].iter().map(|part| scale.log_alone(part, null)).collect();
+    let alone: Vec<f64> = scale.log_alone(&parts[first..], null);
     let alarm = options.alarm();
     let share = if options.changed_after_parts < 2 { 0.0 } else { options.bad_part_share.max(LEAST_SHARE / alarm) };
     // ln(1 + eps E).

@@ -68,6 +68,16 @@ pub(super) struct Memory {
     pub(super) evidence: Option<f64>,
 }
 
+/// A part beside what those before it let expect.
+#[derive(Default)]
+struct Compared {
+    /// Rows that stand alone.
+    odd_rows: Vec<usize>,
+    /// Nothing while the scatter is not known.
+    score: Option<Score>,
+    gram: Option<Gram>,
+}
+
 impl Memory {
     /// Before the first part; `noise` is stated, in the unit of the quantity.
     pub(super) fn new(options: Options, noise: Option<f64>) -> Self {
@@ -97,17 +107,12 @@ impl Memory {
     pub(super) fn take(&mut self, mut part: Sighting, monitor: &dyn Monitor) -> Result<State, Failure> {
         let number = part.number;
         self.free_up(&part);
-        let odd_rows = self.odd_rows(&part, monitor)?;
+        let Compared { odd_rows, score, gram } = self.compared(&mut part, monitor)?;
         if odd_rows.len() as f64 > MOST_ODD * part.value.len() as f64 {
             return Ok(self.unused(number, Unused::MeasureAgain));
         }
-        for &row in &odd_rows {
-            part.keep[row] = false;
-        }
         self.used += 1;
         self.forget();
-        let score = self.score(&part);
-        let gram = self.scatter.as_ref().map(|scatter| Gram::of(&part, scatter, &self.catalogue));
         self.parts.push_back((part, gram));
         if self.scatter.is_none() {
             if self.used < self.options.learning_parts as usize {
@@ -158,7 +163,7 @@ impl Memory {
         if chance(1.0)? > NEVER || chance(f64::INFINITY)? > NEVER {
             return None;
         }
-        let expected = self.expected_rows(part)?;
+        let expected = self.with_null(|_, null| null.expected_rows(part))?;
         let (along, square) =
             part.value.iter().zip(&expected).fold((0.0, 0.0), |sum, (y, f)| (sum.0 + y * f, sum.1 + f * f));
         let fitted = along / square;
@@ -229,25 +234,21 @@ impl Memory {
         self.with_told(|memory, told| memory.null(told).map(|null| then(told, &null))).flatten()
     }
 
-    /// Rows that stand alone beside what was expected of the part.
-    fn odd_rows(&self, part: &Sighting, monitor: &dyn Monitor) -> Result<Vec<usize>, Failure> {
-        let Some(scatter) = &self.scatter else { return Ok(Vec::new()) };
-        let Some(expected) = self.expected_rows(part) else { return Ok(Vec::new()) };
-        let left: Vec<f64> = part.value.iter().zip(expected).map(|(y, e)| y - e).collect();
-        let mut rows = outliers(&part.data(), &left, Some(scatter.sigma), monitor)?.rows;
-        rows.sort_unstable();
-        Ok(rows)
-    }
-
-    /// The rows of a part as the parts before let expect them.
-    fn expected_rows(&self, part: &Sighting) -> Option<Vec<f64>> {
-        self.with_null(|_, null| {
-            let mut expected = part.signs.base.clone();
-            for (size, column) in null.mean().iter().zip(null.rows_of(part)) {
-                expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
+    /// A part beside what those before it let expect; its rows that stand alone count no more.
+    fn compared(&self, part: &mut Sighting, monitor: &dyn Monitor) -> Result<Compared, Failure> {
+        let Some(scatter) = &self.scatter else { return Ok(Compared::default()) };
+        let compared = self.with_null(|_, null| {
+            let left: Vec<f64> = part.value.iter().zip(null.expected_rows(part)).map(|(y, e)| y - e).collect();
+            let mut odd_rows = outliers(&part.data(), &left, Some(scatter.sigma), monitor)?.rows;
+            odd_rows.sort_unstable();
+            for &row in &odd_rows {
+                part.keep[row] = false;
             }
-            expected
-        })
+            let gram = Gram::of(part, scatter, &self.catalogue);
+            let score = self.score(part, &gram, null);
+            Ok(Compared { odd_rows, score, gram: Some(gram) })
+        });
+        compared.unwrap_or_else(|| Ok(Compared::default()))
     }
 
     /// Parts that are too old live on in what is known of what is free.
@@ -264,11 +265,8 @@ impl Memory {
     }
 
     /// The part against what those before it let expect.
-    fn score(&self, part: &Sighting) -> Option<Score> {
-        let scatter = self.scatter.as_ref()?;
-        let gram = Gram::of(part, scatter, &self.catalogue);
-        let told = Told::of(part, &gram, &self.columns);
-        let (chi2, [z_mean, z_taper, z_bow]) = self.with_null(|_, null| null.distance(&told)).flatten()?;
+    fn score(&self, part: &Sighting, gram: &Gram, null: &Null) -> Option<Score> {
+        let (chi2, [z_mean, z_taper, z_bow]) = null.distance(&Told::of(part, gram, &self.columns))?;
         let degrees = gram.rows;
         let p = ChiSquared::new(degrees as f64).map_or(1.0, |law| law.sf(chi2));
         Some(Score { chi2, degrees, p, z_mean, z_taper, z_bow })

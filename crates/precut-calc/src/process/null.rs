@@ -147,17 +147,18 @@ impl<'a> Told<'a> {
             .map(move |&(weight, own)| if weight == 0.0 { 0.0 } else { weight * self.gram.inner[(own, basic)] })
     }
 
-    /// B'B, added.
+    /// B'B, added to the lower triangle, which is all that a factorisation reads.
     fn add_to(&self, a: &mut DMatrix<f64>, eta: &mut DVector<f64>) {
         let last = self.gram.residual();
-        for (i, &(weight, own)) in self.free.iter().enumerate() {
+        for (j, &(weight, own)) in self.free.iter().enumerate() {
             if weight == 0.0 {
                 continue;
             }
-            for (j, along) in self.along(own).enumerate() {
-                a[(i, j)] += weight * along;
+            let inner = self.gram.inner.column(own);
+            for (sum, &(other, basic)) in a.column_mut(j).iter_mut().zip(&self.free).skip(j) {
+                *sum += weight * other * inner[basic];
             }
-            eta[i] += weight * self.gram.inner[(own, last)];
+            eta[j] += weight * inner[last];
         }
     }
 }
@@ -199,6 +200,8 @@ pub(super) struct Null {
     pub(super) columns: Vec<Column>,
     /// Of A0.
     pub(super) factor: Cholesky<f64, Dyn>,
+    /// L^-1: it is applied to all columns at every onset.
+    inverse: DMatrix<f64>,
     /// L^-1 eta.
     pub(super) half: DVector<f64>,
 }
@@ -212,12 +215,13 @@ impl Null {
         parts.for_each(|part| part.add_to(&mut a, &mut eta));
         let factor = Cholesky::new(a)?;
         let half = factor.l_dirty().solve_lower_triangular(&eta)?;
-        Some(Self { columns: columns.to_vec(), factor, half })
+        let inverse = factor.l_dirty().solve_lower_triangular(&DMatrix::identity(count, count))?;
+        Some(Self { columns: columns.to_vec(), factor, inverse, half })
     }
 
     /// L^-1 c.
     pub(super) fn halved(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
-        self.factor.l_dirty().solve_lower_triangular(c).unwrap_or_else(|| c.clone())
+        &self.inverse * c
     }
 
     /// Posterior mean of what is free.
@@ -235,6 +239,15 @@ impl Null {
         self.columns.iter().map(|column| row_column(column, part)).collect()
     }
 
+    /// The rows of a part as they are expected.
+    pub(super) fn expected_rows(&self, part: &Sighting) -> Vec<f64> {
+        let mut expected = part.signs.base.clone();
+        for (size, column) in self.mean().iter().zip(self.rows_of(part)) {
+            expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
+        }
+        expected
+    }
+
     /// Mahalanobis distance of a part to its prediction from what is known here, the part itself not in it: chi2 with as many
     /// degrees as it has rows; and how far its mean, taper and bow lie, in standard deviations.
     pub(super) fn distance(&self, part: &Told<'_>) -> Option<(f64, [f64; 3])> {
@@ -243,6 +256,7 @@ impl Null {
         let free = |basic: usize| DVector::from_iterator(count, part.along(basic));
         let (mut own, mut none) = (DMatrix::zeros(count, count), DVector::zeros(count));
         part.add_to(&mut own, &mut none);
+        own.fill_upper_triangle_with_lower_triangle();
         // e = r - B beta: e'e and B'e.
         let to_r = free(last);
         let left = &to_r - &own * &mean;

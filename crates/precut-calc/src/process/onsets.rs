@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::null::{Form, Null, Told};
 use super::sight::{COSINES, Catalogue};
-use super::sums::{Fit, Sums, Waves};
+use super::sums::{Fit, Reach, Sums, Waves};
 use crate::diagnosis::{log_sum_exp, spread_of_cosines};
 
 /// The last parts are all onsets; before them every fourth is, back to this many parts.
@@ -39,8 +39,7 @@ pub(super) struct Entry {
     pub(super) form: Form,
     /// ln of weight times Bayes factor.
     pub(super) log_weight: f64,
-    /// Posterior mean and variance of its size: of a cause in prior standard deviations of its variant, of cosines root mean
-    /// square along the part, in the unit of the quantity.
+    /// Posterior mean and variance of the size of a cause, in prior standard deviations of its variant.
     pub(super) mean: f64,
     pub(super) variance: f64,
     /// Of cosines all of them.
@@ -70,7 +69,7 @@ impl Scale<'_> {
     pub(super) fn each(&self, parts: &[Told<'_>], null: &Null, first: u32, hear: Hear<'_>) {
         let Some(newest) = parts.last() else { return };
         let basic = newest.gram.residual();
-        let shares = self.catalogue.shares();
+        let tried = Tried::of(self);
         let mut sums = Sums::none(null.columns.len(), basic);
         let mut next: Option<u32> = None;
         for part in parts.iter().rev() {
@@ -82,7 +81,7 @@ impl Scale<'_> {
             next = Some(part.number);
             let weight = self.onset(newest.ordinal - part.ordinal, part.ordinal);
             if weight > 0.0 {
-                self.since(part.number, weight, &sums, null, &shares, hear);
+                self.since(part.number, weight, &sums, null, &tried, hear);
             }
         }
     }
@@ -103,27 +102,23 @@ impl Scale<'_> {
         }
     }
 
-    fn since(&self, since: u32, weight: f64, sums: &Sums, null: &Null, shares: &[f64], hear: Hear<'_>) {
-        for (form, share, scales) in [(Form::Step, STEPS, SCALES.as_slice()), (Form::Drift, DRIFTS, &SCALES[1..])] {
+    fn since(&self, since: u32, weight: f64, sums: &Sums, null: &Null, tried: &Tried, hear: Hear<'_>) {
+        for form in [Form::Step, Form::Drift] {
             let halved = sums.halved(form, null);
-            for (variant, own) in shares.iter().enumerate() {
-                let prior = weight * share * own / scales.len() as f64;
-                for &scale in scales {
-                    let fit = sums.one(COSINES + variant, form, scale, &halved, null);
-                    let fit = fit.within(scale, self.catalogue.variants[variant].reach());
-                    let (what, log_weight) = (What::Cause(variant), prior.ln() + fit.log_bf);
-                    let Fit { mean, variance, .. } = fit;
-                    hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
-                }
+            for own in tried.causes.iter().filter(|own| own.form == form) {
+                let fit = sums.one(COSINES + own.variant, form, own.scale, &halved, null).within(&own.reach);
+                let (what, log_weight) = (What::Cause(own.variant), weight.ln() + own.log_share + fit.log_bf);
+                let Fit { mean, variance, .. } = fit;
+                hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
             }
             if form == Form::Step {
-                for size in 0..SIZES.len() {
-                    let Some(waves) = sums.waves(&self.waves(size), &halved, null) else { continue };
+                let cosines = sums.cosines(&halved, null);
+                for (size, sd) in tried.waves.iter().enumerate() {
+                    let Some(waves) = cosines.waves(sd) else { continue };
                     let prior = weight * UNNAMED / SIZES.len() as f64;
                     let (what, log_weight) = (What::Unnamed(size), prior.ln() + waves.log_bf);
-                    let (mean, variance) = waves.rms();
                     let waves = Some(Box::new(waves));
-                    hear(Entry { since, what, form, log_weight, mean, variance, waves }, &halved);
+                    hear(Entry { since, what, form, log_weight, mean: 0.0, variance: 0.0, waves }, &halved);
                 }
             }
         }
@@ -136,24 +131,70 @@ impl Scale<'_> {
         entries
     }
 
-    /// ln of the Bayes factor of "this part alone is off": by any cause, half the weight, or by cosines.
-    pub(super) fn log_alone(&self, part: &Told<'_>, null: &Null) -> f64 {
-        let shares = self.catalogue.shares();
-        let mut sums = Sums::none(null.columns.len(), part.gram.residual());
-        sums.begin_with(part);
-        let halved = sums.halved(Form::Step, null);
-        let mut all = Vec::new();
-        for (variant, own) in shares.iter().enumerate() {
-            let prior = 0.5 * own / SCALES.len() as f64;
-            let reach = self.catalogue.variants[variant].reach();
-            let fit = |scale| sums.one(COSINES + variant, Form::Step, scale, &halved, null).within(scale, reach);
-            let fits = SCALES.map(|scale| fit(scale).log_bf);
-            all.extend(fits.map(|log_bf| prior.ln() + log_bf));
-        }
-        for size in 0..SIZES.len() {
-            let waves = sums.waves(&self.waves(size), &halved, null);
+    /// ln of the Bayes factor of "this part alone is off", of each of some parts: by any cause, half the weight, or by cosines.
+    pub(super) fn log_alone(&self, parts: &[Told<'_>], null: &Null) -> Vec<f64> {
+        let tried = Tried::of(self);
+        let count = parts.last().map_or(0, |part| part.gram.residual());
+        let alone = |part: &Told<'_>| {
+            let mut sums = Sums::none(null.columns.len(), count);
+            sums.begin_with(part);
+            let halved = sums.halved(Form::Step, null);
+            let fit = |own: &TriedCause| {
+                let fit = sums.one(COSINES + own.variant, Form::Step, own.scale, &halved, null).within(&own.reach);
+                (0.5 / STEPS).ln() + own.log_share + fit.log_bf
+            };
+            let mut all: Vec<f64> = tried.causes.iter().filter(|own| own.form == Form::Step).map(fit).collect();
+            let cosines = sums.cosines(&halved, null);
+            let waves = tried.waves.iter().filter_map(|sd| cosines.waves(sd));
             all.extend(waves.map(|waves| (0.5 / SIZES.len() as f64).ln() + waves.log_bf));
+            log_sum_exp(&all)
+        };
+        parts.iter().map(alone).collect()
+    }
+}
+
+/// All that is tried at every onset.
+struct Tried {
+    causes: Vec<TriedCause>,
+    /// Prior standard deviations of the cosines, of each of [`SIZES`].
+    waves: Vec<Vec<f64>>,
+}
+
+/// A variant of a cause, of one form and size.
+struct TriedCause {
+    form: Form,
+    variant: usize,
+    scale: f64,
+    /// ln of its share of all that may change.
+    log_share: f64,
+    reach: Reach,
+}
+
+impl Tried {
+    fn of(scale: &Scale<'_>) -> Self {
+        let shares = scale.catalogue.shares();
+        let mut causes = Vec::new();
+        for (form, share, scales) in [(Form::Step, STEPS, SCALES.as_slice()), (Form::Drift, DRIFTS, &SCALES[1..])] {
+            for (variant, own) in shares.iter().enumerate() {
+                let log_share = (share * own / scales.len() as f64).ln();
+                let reach = scale.catalogue.variants[variant].reach();
+                causes.extend(scales.iter().map(|&scale| TriedCause {
+                    form,
+                    variant,
+                    scale,
+                    log_share,
+                    reach: Reach::of(scale, reach),
+                }));
+            }
         }
-        log_sum_exp(&all)
+        Self { causes, waves: (0..SIZES.len()).map(|size| scale.waves(size)).collect() }
+    }
+}
+
+impl Entry {
+    /// Posterior mean and variance of its size: of a cause in prior standard deviations of its variant, of cosines root mean
+    /// square along the part, in the unit of the quantity.
+    pub(super) fn size(&self) -> (f64, f64) {
+        self.waves.as_ref().map_or((self.mean, self.variance), |waves| waves.rms())
     }
 }

@@ -35,7 +35,7 @@ pub struct Snapshot {
 }
 
 /// Which version this program writes and reads.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A part on record, with what its edge had cut before it.
 #[derive(Clone, Copy, Serialize, Deserialize)]

@@ -12,7 +12,7 @@ pub(super) struct Sums {
     square: [Vec<f64>; 3],
     /// X'r: times 1, and times n - tau + 1.
     right: [Vec<f64>; 2],
-    /// B'X, likewise.
+    /// X'B, likewise.
     free: [DMatrix<f64>; 2],
     /// X'X of the cosines.
     waves: DMatrix<f64>,
@@ -31,19 +31,38 @@ pub(super) struct Fit {
 /// Beyond so many standard deviations a bound is no bound.
 const FAR: f64 = 6.0;
 
-impl Fit {
-    /// The same where the size cannot leave a range: both densities are cut off there. `scale` is the standard deviation of the
-    /// prior.
-    pub(super) fn within(self, scale: f64, [least, most]: [f64; 2]) -> Self {
+/// Where the size of a cause cannot leave a range.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Reach {
+    Free,
+    /// Between these ends, where the prior has ln P(within) of its own.
+    Bounded {
+        least: f64,
+        most: f64,
+        log_before: f64,
+    },
+}
+
+impl Reach {
+    /// `scale` is the standard deviation of the prior.
+    pub(super) fn of(scale: f64, [least, most]: [f64; 2]) -> Self {
         if least < -FAR * scale && most > FAR * scale {
-            return self;
+            return Self::Free;
         }
+        Self::Bounded { least, most, log_before: normal_between(least / scale, most / scale).ln() }
+    }
+}
+
+impl Fit {
+    /// The same where the size cannot leave a range: both densities are cut off there.
+    pub(super) fn within(self, reach: &Reach) -> Self {
+        let &Reach::Bounded { least, most, log_before } = reach else { return self };
         let deviation = self.variance.sqrt();
         let [a, b] = [least, most].map(|end| (end - self.mean) / deviation);
-        let (own, before) = (normal_between(a, b), normal_between(least / scale, most / scale));
+        let own = normal_between(a, b);
         // So far outside that only the bound is left.
         if own < f64::MIN_POSITIVE {
-            let log_bf = self.log_bf - 0.5 * a.max(-b).powi(2) - before.ln();
+            let log_bf = self.log_bf - 0.5 * a.max(-b).powi(2) - log_before;
             return Self { log_bf, mean: self.mean.clamp(least, most), variance: 0.0 };
         }
         let density =
@@ -52,7 +71,7 @@ impl Fit {
         let shift = (density(a) - density(b)) / own;
         let spread = 1.0 + (times(a) - times(b)) / own - shift * shift;
         Self {
-            log_bf: self.log_bf + own.ln() - before.ln(),
+            log_bf: self.log_bf + own.ln() - log_before,
             mean: (self.mean + deviation * shift).clamp(least, most),
             variance: self.variance * spread.max(0.0),
         }
@@ -81,7 +100,7 @@ impl Sums {
         Self {
             square: [zeros(), zeros(), zeros()],
             right: [zeros(), zeros()],
-            free: [DMatrix::zeros(free, basic), DMatrix::zeros(free, basic)],
+            free: [DMatrix::zeros(basic, free), DMatrix::zeros(basic, free)],
             waves: DMatrix::zeros(COSINES, COSINES),
         }
     }
@@ -110,9 +129,9 @@ impl Sums {
             if weight == 0.0 {
                 continue;
             }
-            for basic in 0..last {
-                let product = weight * inner[(own, basic)];
-                self.free.iter_mut().for_each(|sums| sums[(k, basic)] += product);
+            let column = inner.column(own);
+            for sums in &mut self.free {
+                sums.column_mut(k).iter_mut().zip(column.iter()).for_each(|(sum, product)| *sum += weight * product);
             }
         }
         self.waves += inner.view((0, 0), (COSINES, COSINES));
@@ -121,8 +140,8 @@ impl Sums {
     /// L^-1 c of every basic column.
     pub(super) fn halved(&self, form: Form, null: &Null) -> DMatrix<f64> {
         match form {
-            Form::Step => null.halved(&self.free[0]),
-            Form::Drift => null.halved(&(&self.free[1] / DRIFT_PARTS)),
+            Form::Step => null.halved(&self.free[0].transpose()),
+            Form::Drift => null.halved(&(self.free[1].transpose() / DRIFT_PARTS)),
         }
     }
 
@@ -139,15 +158,29 @@ impl Sums {
         Fit { log_bf: -0.5 * spread.ln() + 0.5 * s2 * b * b / spread, mean: s2 * b / spread, variance: s2 / spread }
     }
 
-    /// The same of all cosines with these prior standard deviations.
-    pub(super) fn waves(&self, sd: &[f64], halved: &DMatrix<f64>, null: &Null) -> Option<Waves> {
+    /// G* and b* of all cosines.
+    pub(super) fn cosines(&self, halved: &DMatrix<f64>, null: &Null) -> Cosines {
         let own = halved.columns(0, COSINES);
         let g = &self.waves - own.tr_mul(&own);
         let b = DVector::from_column_slice(&self.right[0][..COSINES]) - own.tr_mul(&null.half);
+        Cosines { g, b }
+    }
+}
+
+/// What parts since an onset tell of a step of all cosines, what is free taken out.
+pub(super) struct Cosines {
+    g: DMatrix<f64>,
+    b: DVector<f64>,
+}
+
+impl Cosines {
+    /// The evidence of all of them with these prior standard deviations.
+    pub(super) fn waves(&self, sd: &[f64]) -> Option<Waves> {
         let sd = DVector::from_column_slice(sd);
-        let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| f64::from(u8::from(i == j)) + sd[i] * g[(i, j)] * sd[j]);
+        let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
+        let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| unit(i, j) + sd[i] * self.g[(i, j)] * sd[j]);
         let factor = Cholesky::new(scaled)?;
-        let right = sd.component_mul(&b);
+        let right = sd.component_mul(&self.b);
         let solved = factor.solve(&right);
         let log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
         let (log_bf, mean) = (0.5 * right.dot(&solved) - log_det, sd.component_mul(&solved));
@@ -262,12 +295,12 @@ mod tests {
                 sums.iter_mut().zip([1.0, theta, theta * theta]).for_each(|(sum, power)| *sum += own * power);
             }
             let mean = sums[1] / sums[0];
-            let fit = whole.within(scale, [least, most]);
+            let fit = whole.within(&Reach::of(scale, [least, most]));
             assert!((fit.log_bf - f64::ln(sums[0] / prior)).abs() < 1e-6, "{fit:?}");
             assert!((fit.mean - mean).abs() < 1e-6 && (fit.variance - (sums[2] / sums[0] - mean * mean)).abs() < 1e-6);
         }
-        assert_eq!(whole.within(scale, [-9.0, 9.0]), whole);
-        assert!((whole.within(scale, [900.0, 901.0]).mean - 900.0).abs() < 1e-12);
+        assert_eq!(whole.within(&Reach::of(scale, [-9.0, 9.0])), whole);
+        assert!((whole.within(&Reach::of(scale, [900.0, 901.0])).mean - 900.0).abs() < 1e-12);
     }
 
     #[test]
@@ -319,7 +352,7 @@ mod tests {
                 }
             }
             let waves: Vec<(usize, f64)> = sd.iter().copied().enumerate().collect();
-            let log_bf = sums.waves(&sd, &sums.halved(Form::Step, &null), &null).unwrap().log_bf;
+            let log_bf = sums.cosines(&sums.halved(Form::Step, &null), &null).waves(&sd).unwrap().log_bf;
             assert!((log_bf - with(&waves, Form::Step)).abs() < 1e-9, "since {}", part.number);
         }
     }

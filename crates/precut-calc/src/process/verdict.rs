@@ -72,8 +72,8 @@ pub(super) fn judged(entries: &[Entry], catalogue: &Catalogue, parts: &[Told<'_>
         let leader = own.iter().max_by(|a, b| a.log_weight.total_cmp(&b.log_weight))?;
         let alike = own.iter().filter(|entry| entry.form == leader.form && is_alike(entry.what, leader.what));
         let moments = alike
-            .map(|entry| (share(entry), entry.mean, entry.variance))
-            .fold((0.0, 0.0, 0.0), |(w, m, s), (share, mean, variance)| {
+            .map(|entry| (share(entry), entry.size()))
+            .fold((0.0, 0.0, 0.0), |(w, m, s), (share, (mean, variance))| {
                 (w + share, m + share * mean, s + share * (mean * mean + variance))
             });
         let mean = moments.1 / moments.0;
