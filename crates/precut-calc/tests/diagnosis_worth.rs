@@ -342,10 +342,16 @@ fn two_blunders_side_by_side_are_set_aside_where_another_sweep_saw_nothing() {
 
 #[test]
 fn a_narrow_structure_that_every_sweep_shows_stays_and_is_told() {
-    let answer = two_off(60, [1.0, 1.0], |_, _| true);
-    assert!(answer.output.outliers.is_empty(), "{:?}", answer.output.outliers);
-    assert_ne!(answer.output.verdict, VerdictClass::Adequate);
-    assert!(warned(&answer, "far_rows_kept"), "{:?}", answer.warnings);
+    // Of two rows, and of one alone.
+    for shares in [[1.0, 1.0], [1.0, 0.0]] {
+        let answer = two_off(60, shares, |_, _| true);
+        assert!(answer.output.outliers.is_empty(), "{:?}", answer.output.outliers);
+        assert_ne!(answer.output.verdict, VerdictClass::Adequate);
+        assert!(warned(&answer, "far_rows_kept"), "{:?}", answer.warnings);
+        // What the part has there is no scatter of the gauge.
+        let sigma_um = answer.output.noise.standard_deviation;
+        assert!((sigma_um / SIGMA_UM - 1.0).abs() < 0.12, "{sigma_um}");
+    }
 }
 
 #[test]

@@ -21,6 +21,8 @@ pub struct Foundation<'a> {
     pub residual: Vec<f64>,
     /// Standard deviation of every row, where the scatter has heavy tails.
     pub heavy_tails: Option<Vec<f64>>,
+    /// Rows that belong to a narrow structure: what they are off is no scatter.
+    pub far_rows: Vec<usize>,
     pub(super) signatures: Signatures,
     /// One standard deviation of every allowance; most act in one run only.
     pub(super) nuisances: Vec<Sparse>,
@@ -52,6 +54,7 @@ impl<'a> Foundation<'a> {
             predicted,
             residual,
             heavy_tails: None,
+            far_rows: Vec::new(),
             signatures,
             nuisances,
             allowed,
@@ -72,6 +75,13 @@ impl<'a> Foundation<'a> {
             return Ok(Outliers::default());
         }
         outliers(self.data, &self.residual, None, monitor)
+    }
+
+    /// Of the rows that are kept, those that tell of the scatter.
+    pub(super) fn scattering(&self, keep: &[bool]) -> Vec<bool> {
+        let mut scattering = keep.to_vec();
+        self.far_rows.iter().for_each(|&row| scattering[row] = false);
+        scattering
     }
 
     /// Rows that the base predicts and that are not set aside.

@@ -42,7 +42,7 @@ impl Outliers {
 }
 
 /// Worst first: a row is taken out, its trace fitted again without it, and flagged if its neighbours are
-/// then at peace. So are two neighbours that only come to peace together, where another sweep passed there and saw nothing
+/// then at peace and no other sweep shows the same there. So are two neighbours that only come to peace together, where another sweep passed there and saw nothing
 /// of it. Otherwise the row is part of a structure and stays.
 ///
 /// The deletion is essential: in a fit that contains it, a spike of 20 sigma drags its neighbours beyond
@@ -84,10 +84,13 @@ pub(crate) fn outliers(
         if t < SUSPECT * spread {
             break spread;
         }
-        let blunders = if traces[trace].stands_alone(place, AT_PEACE * spread) {
-            vec![place]
+        let smooth = &data.layout.design.smooth;
+        let blunders = if !traces[trace].stands_alone(place, AT_PEACE * spread) {
+            two_blunders(&traces, smooth, trace, place, spread)
+        } else if is_shown_elsewhere(&traces, smooth, trace, place, spread) {
+            Vec::new()
         } else {
-            two_blunders(&traces, &data.layout.design.smooth, trace, place, spread)
+            vec![place]
         };
         let fit = &mut traces[trace];
         if blunders.is_empty() {
@@ -110,6 +113,20 @@ pub(crate) fn outliers(
     let mut far_rows: Vec<usize> = far.collect();
     far_rows.sort_unstable();
     Ok(Outliers { rows: flagged, too_many: false, heavy_tails: None, far_rows })
+}
+
+/// Whether at least half of the other sweeps that have a row there, within half of the way to the next one, are as far away on
+/// the same side: the part has something there that is narrower than the rows are apart. Of heavy tails now and then one is.
+fn is_shown_elsewhere(traces: &[Fit], smooth: &Smooth, trace: usize, place: usize, spread: f64) -> bool {
+    let (Smooth::Along(along) | Smooth::Around(along)) = smooth else { return false };
+    let fit = &traces[trace];
+    let (at, t) = (along[fit.rows[place]], fit.t[place]);
+    let gaps = beyond(place, &fit.out).into_iter().map(|next| (along[fit.rows[next]] - at).abs());
+    let Some(gap) = gaps.reduce(f64::min) else { return false };
+    let others = traces.iter().enumerate().filter(|(other, _)| *other != trace).map(|(_, other)| other);
+    let witnesses: Vec<f64> = others.filter_map(|other| other.nearest(along, at, 0.5 * gap)).collect();
+    let agree = witnesses.iter().filter(|other| **other * t > 0.0 && other.abs() > SUSPECT * spread).count();
+    agree > 0 && 2 * agree >= witnesses.len()
 }
 
 /// A far row and a neighbour as far away, if the rows beside both are at peace without them and every sweep that passed the

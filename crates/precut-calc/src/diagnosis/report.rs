@@ -51,6 +51,7 @@ pub(super) fn answer<M: Diagnosable>(
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers(monitor)?;
+    foundation.far_rows.clone_from(&found.far_rows);
     if job.options.leave_outliers_out {
         foundation.heavy_tails.clone_from(&found.heavy_tails);
     }

@@ -230,7 +230,8 @@ impl<'a> Weighing<'a> {
         monitor: &dyn Monitor,
     ) -> Result<Self, Failure> {
         let Foundation { subject, data, residual, nuisances, signatures, .. } = foundation;
-        let noise = Noise::of(data, residual, &keep, foundation.heavy_tails.as_deref());
+        let scattering = foundation.scattering(&keep);
+        let noise = Noise::of(data, residual, &scattering, foundation.heavy_tails.as_deref());
         let likelihood = Likelihood::of(data, &noise, nuisances, &keep);
         let linear = Linear::new(subject.hypotheses(), signatures, likelihood, residual);
         let candidates = linear.search(effort.most_causes, effort.leading, monitor)?;
