@@ -17,7 +17,6 @@ pub mod force;
 pub mod machinability;
 pub mod material;
 pub mod milling_stability;
-pub mod num;
 pub mod path;
 pub mod process;
 pub mod program_compensation;
@@ -26,6 +25,8 @@ pub mod ring_clamping;
 pub mod ring_roundness;
 pub mod shaft;
 pub mod turning;
+
+pub use precut_num as num;
 
 use calculator::Registrar;
 

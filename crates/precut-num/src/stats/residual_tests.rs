@@ -2,7 +2,7 @@
 
 use super::distributions::{chi_squared_tail, f_tail, normal_tail};
 use super::linear::{Linear, regress};
-use crate::num::dense::Columns;
+use crate::dense::Columns;
 
 /// A statistic and how probable it is to be that large or larger by chance.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! How well the parameters are known.
 
 use super::Fit;
-use crate::num::dense::{Columns, Qr};
+use crate::dense::{Columns, Qr};
 
 /// Where the size of the residuals' noise comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl Fit {
             }
             standard_deviations[i] = Some(residual_sd * inverse.at(a, a).max(0.0).sqrt() / lengths[a]);
         }
-        let (values, _) = crate::num::dense::symmetric_eigen(&inverse);
+        let (values, _) = crate::dense::symmetric_eigen(&inverse);
         let collinearity = values.last().copied().unwrap_or(1.0).max(1.0).sqrt();
         Covariance { residual_sd, degrees_of_freedom, standard_deviations, matrix, collinearity }
     }

@@ -10,7 +10,7 @@ const LEAST: f64 = 1e-3;
 
 /// Moves starts to the roots (Aberth). `log_slope` is P'/P, `None` at a root that is met. Starts that lie symmetrically about an
 /// axis, or on one another, stay so.
-pub(crate) fn aberth(at: &mut [Complex<f64>], log_slope: impl Fn(Complex<f64>) -> Option<Complex<f64>>) {
+pub fn aberth(at: &mut [Complex<f64>], log_slope: impl Fn(Complex<f64>) -> Option<Complex<f64>>) {
     for _ in 0..STEPS {
         let mut moved: f64 = 0.0;
         for i in 0..at.len() {

@@ -11,7 +11,7 @@ pub mod gp;
 pub mod hull;
 pub mod lsq;
 pub mod quadrature;
-pub(crate) mod roots;
+pub mod roots;
 pub mod roundness;
 pub mod socp;
 pub mod stats;

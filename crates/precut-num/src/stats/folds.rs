@@ -1,7 +1,7 @@
 //! Cross-validation in closed form: no refit is needed to know what a fit without some rows predicts for them.
 
 use super::Linear;
-use crate::num::dense::{Columns, Qr};
+use crate::dense::{Columns, Qr};
 
 /// Errors of prediction of every row from all others: e/(1 - h); `None` where the others do not determine the row.
 pub fn leave_one_out(fit: &Linear) -> Vec<Option<f64>> {

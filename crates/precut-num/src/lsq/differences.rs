@@ -8,7 +8,7 @@
 
 use super::Parameter;
 use super::system::{Point, Quality, System};
-use crate::num::dense::Columns;
+use crate::dense::Columns;
 
 /// Halvings of the step that are probed.
 const LEVELS: usize = 14;

@@ -1,7 +1,7 @@
 //! Linear least squares with everything that is to be known of each row and each coefficient.
 
 use super::distributions::t_quantile;
-use crate::num::dense::{Columns, Qr, dot, length, symmetric_eigen};
+use crate::dense::{Columns, Qr, dot, length, symmetric_eigen};
 
 /// A column is dependent on others when less than this share of its length stands out from them.
 const DEPENDENT: f64 = 1e-9;
@@ -93,7 +93,7 @@ fn careful_residuals(design: &Columns, coefficients: &[f64], y: &[f64]) -> Vec<f
                 let (product, rest) = exact_product(design.at(i, j), -b);
                 [product, rest]
             });
-            crate::num::dense::compensated_sum(std::iter::once(*y).chain(terms))
+            crate::dense::compensated_sum(std::iter::once(*y).chain(terms))
         })
         .collect()
 }

@@ -3,7 +3,7 @@
 use super::Settings;
 use super::bounds::{free, held, project};
 use super::system::{Point, Quality, System, Tangent};
-use crate::num::dense::{Columns, Qr, length};
+use crate::dense::{Columns, Qr, length};
 
 /// Damping at the start, in units of the columns' squared lengths.
 pub(super) const FIRST_DAMPING: f64 = 1e-3;

@@ -4,7 +4,7 @@ use super::bounds::{free, held, project};
 use super::descent::Descended;
 use super::system::{Point, Quality, System, Tangent};
 use super::{Ending, Fit};
-use crate::num::dense::{Qr, length};
+use crate::dense::{Qr, length};
 
 /// Most steps.
 const STEPS: u32 = 60;
@@ -77,7 +77,7 @@ pub(super) fn at_start(system: &mut System<'_>) -> Fit {
 fn undefined(system: &System<'_>, point: Point, ending: Ending) -> Fit {
     let count = point.at.len();
     let tangent =
-        Tangent { residuals: point.raw.clone(), columns: crate::num::dense::Columns::zeros(point.raw.len(), count) };
+        Tangent { residuals: point.raw.clone(), columns: crate::dense::Columns::zeros(point.raw.len(), count) };
     let newton = Newton {
         step: Vec::new(),
         free: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::differences::Differences;
 use super::{Loss, Model, NoFit, Parameter};
-use crate::num::dense::Columns;
+use crate::dense::Columns;
 
 /// How well derivatives must be known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Tables of an element: Gauss points, and moments of the Lagrange polynomials on them.
 
-use crate::num::quadrature::gauss_legendre;
+use crate::quadrature::gauss_legendre;
 
 /// Terms of the Taylor series of the matrix exponential over one element. With norm(A) h up to 8 the last is below
 /// 8^48/48! = 2e-18 of the first.
