@@ -66,7 +66,7 @@ fn physics_is_pure() {
         forbid(place, &words, &[]);
     }
     // Values by the names of their fields, as effects are moved and read, and no text.
-    forbid("crates/precut-calc/src", &["serde_json"], &["diagnosis/known.rs", "calculator/diagnosable.rs"]);
+    forbid("crates/precut-calc/src", &["serde_json"], &["diagnosis/model/known.rs", "calculator/diagnosable.rs"]);
     forbid("crates/precut-calc/src", &["serde_json::from_str", "serde_json::to_string", "serde_json::to_vec"], &[]);
 }
 
@@ -80,6 +80,16 @@ fn the_compute_crates_depend_on_nothing_of_the_service() {
         for name in manifest["dependencies"].as_table().unwrap().keys() {
             assert!(allowed.contains(&name.as_str()), "{package} depends on {name}");
         }
+    }
+}
+
+#[test]
+fn each_folder_of_the_diagnosis_knows_those_before_it_alone() {
+    let folders = ["rows", "statistics", "causes", "verdict", "model", "answer"];
+    for (place, folder) in folders.iter().enumerate() {
+        let later: Vec<String> = folders[place + 1..].iter().map(|later| format!("diagnosis::{later}::")).collect();
+        let later: Vec<&str> = later.iter().map(String::as_str).collect();
+        forbid(&format!("crates/precut-calc/src/diagnosis/{folder}"), &later, &[]);
     }
 }
 

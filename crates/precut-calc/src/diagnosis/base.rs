@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::input::{DiagnosisOptions, PriorWeight};
-use super::known::{Known, with_numbers};
-use super::subject::{Belief, Form, Setting, Subject};
-use super::weigh::Effort;
 use crate::calculator::{
     Design, Diagnosable, Expansions, Failure, Held, Hypotheses, Hypothesis, Inapplicability, Inapplicable,
     JacobianColumn, Missing, Monitor, Over, Prediction, Smooth, Treatment, Unnamed, Variable,
 };
+use crate::diagnosis::causes::subject::{Belief, Form, Setting, Subject};
+use crate::diagnosis::model::known::{Known, with_numbers};
+use crate::diagnosis::verdict::weigh::Effort;
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
 const DEAR_MS: f64 = 5.0;

@@ -3,18 +3,18 @@
 use std::collections::BTreeSet;
 use std::marker::PhantomData;
 
+use super::answer::{picture, report, said};
 use super::base::Bound;
-use super::copies::{copies, digits_written};
-use super::data::{Data, Layout};
 use super::input::{DiagnosisJob, MAX_RUNS};
-use super::known::{Known, has_parameter};
-use super::output::DiagnosisResult;
-use super::{picture, report, said};
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Check, Codes, Cost, Design, Diagnosable, Failure, Figure, Finding,
     ForwardModel, Hallmark, MeasuredRow, Measurement, Message, Meta, Monitor, PrepareError, Reading, Rows, Table,
     Violations,
 };
+use crate::diagnosis::answer::output::DiagnosisResult;
+use crate::diagnosis::model::known::{Known, has_parameter};
+use crate::diagnosis::rows::copies::{copies, digits_written};
+use crate::diagnosis::rows::data::{Data, Layout};
 
 /// Rows from which on at least adequacy can be judged.
 pub(super) const LEAST_ROWS: usize = 8;

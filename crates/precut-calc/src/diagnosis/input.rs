@@ -5,9 +5,9 @@ use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
-use super::known::JointUncertainty;
-use super::weigh::LEVEL;
 use crate::calculator::{ConditionRange, ForwardModel, Measured, MeasuredRow, Measurement};
+use crate::diagnosis::model::known::JointUncertainty;
+use crate::diagnosis::verdict::weigh::LEVEL;
 
 /// Most runs of one diagnosis.
 pub const MAX_RUNS: usize = 500;
