@@ -103,6 +103,7 @@ mod process_streams;
 mod process_support;
 mod process_watch;
 mod program_across;
+mod program_certainty;
 mod program_correction;
 mod program_diagnosis;
 mod program_drawing;
