@@ -224,6 +224,36 @@ fn a_program_that_is_not_corrected_is_judged_as_it_is() {
     assert!(number(&as_it_is, "/joint/probability") < 0.1, "{as_it_is}");
 }
 
+/// What is driven more often, longer or through more moves is expected to take longer.
+#[test]
+fn what_takes_longer_is_expected_to() {
+    let ms = |job: &Value| ProgramCompensation::cost(&serde_json::from_value(job.clone()).unwrap()).ms;
+    let mut plain = job(&json!({}));
+    plain.as_object_mut().unwrap().retain(|field, _| field != "tolerance" && field != "uncertainty");
+    let mut read = plain.clone();
+    read["mode"] = json!({ "kind": "read" });
+    let mut short = plain.clone();
+    short["nc_program"] = json!(plain["nc_program"].as_str().unwrap().replace("Z-380.", "Z-210."));
+    // As many lines; a cycle over them makes twenty passes.
+    let head = "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X36. Z2.\n";
+    let of = |depth: &str| {
+        let mut rough = read.clone();
+        let contour = "N10 G0 X16.\nG1 Z-200. F0.1\nX26.\nZ-380.\nN20 X36.\n";
+        rough["nc_program"] =
+            json!(format!("{head}G71 U{depth} R0.5\nG71 P10 Q20 U0.6 W0.1 F0.25\n{contour}G0 X100.\nM30\n"));
+        rough
+    };
+    for (less, more, times) in [
+        (&read, &plain, 1.5),
+        (&short, &plain, 1.05),
+        (&plain, &job(&json!({ "diameter_um": 16 })), 10.0),
+        (&of("5."), &of("0.5"), 3.0),
+    ] {
+        assert!(ms(more) > times * ms(less), "{} {}: {less}\n{more}", ms(less), ms(more));
+    }
+    assert!(ms(&read) < 10.0);
+}
+
 #[test]
 fn the_stamp_says_how_probably_the_limits_are_kept() {
     let mut job = job(&json!({ "diameter_um": 16 }));

@@ -18,7 +18,7 @@ use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect};
 
 use super::ProgramCompensation;
 use super::job::{Job, SupportLines};
-use super::made::{Made, drive_ms};
+use super::made::{Made, drive_ms, drive_ms_of};
 use super::measurement::ProgramMeasurement;
 use super::model::stock::Part;
 use super::model::yielding::radius_at;
@@ -250,7 +250,7 @@ impl ForwardModel for ProgramCompensation {
     }
 
     fn predict_cost(prepared: &PreparedProgram) -> Cost {
-        let ms = prepared.runs.iter().map(|run| drive_ms(run.part.program.lines)).sum();
+        let ms = prepared.runs.iter().map(|run| drive_ms(&run.part.program, &run.part.job)).sum();
         Cost { ms, bytes: 1_000_000 * prepared.runs.len() as u64, driver: "/job/nc_program" }
     }
 }
@@ -324,6 +324,6 @@ impl Diagnosable for ProgramCompensation {
     }
 
     fn predict_ms(job: &Job) -> f64 {
-        drive_ms(job.nc_program.lines().count())
+        drive_ms_of(job)
     }
 }

@@ -1,6 +1,6 @@
 //! A part that a program made, and how it would come out were something not quite as it is stated.
 
-use crate::calculator::{Failure, Finding, Monitor};
+use crate::calculator::{Failure, Finding, Monitor, Unwatched};
 use crate::deflection_compensation::{Holding, Theory};
 use crate::diameters::Draw;
 use crate::effects::DeflectionEffect;
@@ -90,7 +90,31 @@ fn without_force() -> Failure {
     Failure::OutOfModel(Finding::new("prediction_without_force", "/job/force"))
 }
 
-/// Time of one drive of a program of so many lines, ms (measured).
-pub(super) fn drive_ms(lines: usize) -> f64 {
-    0.1 * lines as f64
+/// Time of one drive of a program over work that yields, ms: of each move at the feed what it costs to hold the work and to take it
+/// away, and its places, which cost more where many moves have left their marks (measured: 0.8 ms for 10 moves of 200 mm, 26 ms for
+/// 315 and 1160 ms for 10,300 short ones, 93 ms for 100 of 380 mm).
+pub(super) fn drive_ms(program: &Program, job: &Job) -> f64 {
+    const MOVE_MS: f64 = 0.05;
+    // Ends and what is beside them, then every 5 mm and in between.
+    let places = |length_mm: f64| 9.0 + 0.44 * length_mm.min(2000.0);
+    let mut from = job.reading.start.map(|start| [start.x_diameter_mm, start.z_mm]);
+    let (mut moves, mut looked_at) = (0.0, 0.0);
+    for one in &program.moves {
+        let begin = std::mem::replace(&mut from, one.end.known());
+        if let Some((a, b)) = begin.zip(one.end.known()).filter(|_| one.kind.is_feed()) {
+            moves += 1.0;
+            looked_at += places((0.5 * (b[0] - a[0])).hypot(b[1] - a[1]));
+        }
+    }
+    let place_ms = 0.001 + 0.003 * moves / (moves + 60.0);
+    // Where all of the outline bends by itself, every move bends all of it.
+    let bends_whole = job.include.weight || job.stock.as_ref().is_some_and(|s| s.theory == Some(Theory::Timoshenko));
+    let times = if bends_whole { 3.0 } else { 1.0 };
+    times * (MOVE_MS * moves + place_ms * looked_at)
+}
+
+/// The same of a job; nothing of a program that is not read.
+pub(super) fn drive_ms_of(job: &Job) -> f64 {
+    let read = reader::read(&job.nc_program, job.dialect, &job.reading, &Unwatched);
+    read.map_or(0.0, |program| drive_ms(&program, job))
 }

@@ -106,8 +106,8 @@ impl Calculator for ProgramCompensation {
         let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
         // Over a blank a move is held against what it comes near to, however long the program is (measured).
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
-        // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
-        let yielding_ms = if job.force.is_some() { 0.08 * lines as f64 } else { 0.0 };
+        // Where the work yields, every move bends a beam of its own.
+        let yielding_ms = if job.force.is_some() { made::drive_ms_of(job) } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
         let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
         // New feeds drive it until the schedule and what comes out at its feeds are one.
