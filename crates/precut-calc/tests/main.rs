@@ -113,6 +113,7 @@ mod program_nose;
 mod program_reading;
 mod program_refeed;
 mod program_stock;
+mod program_subs;
 mod program_yielding;
 mod receptance_fit;
 mod ring_cases;
