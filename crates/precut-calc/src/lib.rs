@@ -10,6 +10,7 @@ pub mod clamping;
 pub mod compliance_fit;
 pub mod deflection_compensation;
 pub mod diagnosis;
+mod diameters;
 pub mod effects;
 pub mod feed_schedule;
 pub mod fixture_stability;

@@ -185,7 +185,7 @@ fn what_is_no_such_cycle_is_refused() {
     }
     // LinuxCNC has it with the contour in a subprogram.
     let found = fault("G21 G18 G7\nT1 M6\nF1\nG0 X40 Z2\nG72 Q100\nM2\n", "linuxcnc");
-    assert_eq!((found.code, word(&found).as_str()), ("cycle_not_read", "G72"));
+    assert_eq!((found.code, word(&found).as_str()), ("contour_not_found", "Q100"));
     let place: Value = json!([number(&found, "line"), number(&found, "column")]);
-    assert_eq!(place, json!([5.0, 1.0]));
+    assert_eq!(place, json!([5.0, 5.0]));
 }

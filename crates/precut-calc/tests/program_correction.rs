@@ -144,9 +144,10 @@ fn the_reference_programs_come_out_as_they_are_meant() {
     assert!(wrong.is_empty(), "{wrong}");
 }
 
-/// Whether LinuxCNC's own interpreter runs a program to its end; told and passed over where it is not installed.
-fn is_run_by_linuxcnc(program: &str) -> bool {
-    let folder = std::env::temp_dir().join(format!("precut-correction-{}", std::process::id()));
+/// What LinuxCNC's own interpreter makes of a program, and whether it runs it to its end; nothing where it is not installed, which is
+/// told.
+pub(crate) fn said_by_linuxcnc(program: &str, name: &str) -> Option<(bool, String)> {
+    let folder = std::env::temp_dir().join(format!("precut-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("program.ngc");
     std::fs::write(&file, program).unwrap();
@@ -154,10 +155,15 @@ fn is_run_by_linuxcnc(program: &str) -> bool {
     let _ = std::fs::remove_dir_all(&folder);
     let Ok(output) = run else {
         println!("rs274 is not here");
-        return true;
+        return None;
     };
-    let said = String::from_utf8_lossy(&output.stdout);
-    output.status.success() && said.contains("STRAIGHT_FEED") && said.contains("PROGRAM_END")
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    Some((output.status.success() && said.contains("STRAIGHT_FEED") && said.contains("PROGRAM_END"), said))
+}
+
+/// Whether it runs a program to its end.
+fn is_run_by_linuxcnc(program: &str) -> bool {
+    said_by_linuxcnc(program, "correction").is_none_or(|(is_run, _)| is_run)
 }
 
 /// How far the diameter of the returned program, driven as one of its own, is off what was told of it, um, and at how many
@@ -175,7 +181,9 @@ pub(crate) fn off_from_told(job: &Value, compensation: &CompensatedProgram) -> (
         if is_round || compensation.transitions.iter().any(is_thick) {
             continue;
         }
-        let Some(real) = real(contour, z) else { continue };
+        let Some(real) = real(contour, z) else {
+            continue;
+        };
         let error = 1000.0 * (real - told.wanted_diameter_mm[i]);
         worst = worst.max((error - told.diameter_error_um[i]).abs());
         compared += 1;
@@ -209,7 +217,9 @@ fn programs_of_every_control_are_corrected_and_proved() {
             if dialect == "linuxcnc" {
                 assert!(is_run_by_linuxcnc(&compensation.nc_program), "{}", compensation.nc_program);
             }
-            let Some(proof) = &compensation.proof else { continue };
+            let Some(proof) = &compensation.proof else {
+                continue;
+            };
             changed += 1;
             changed_lines += compensation.lines_changed.len();
             assert!(proof.largest_residual_um <= RESIDUAL_UM, "{proof:?}");

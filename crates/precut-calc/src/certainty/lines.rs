@@ -13,7 +13,8 @@ use std::ops::RangeInclusive;
 
 use crate::calculator::{Failure, Monitor, checkpoint};
 
-use super::{normal_below, normal_quantile};
+use super::line::{Line, places};
+use super::normal_quantile;
 
 /// Independent scramblings; their spread is the error.
 pub(crate) const SCRAMBLINGS: usize = 8;
@@ -27,20 +28,20 @@ const LARGEST_ERROR: [f64; 2] = [0.002, 0.1];
 const NEAR_SHARE: f64 = 0.5;
 /// An error no larger than this times that of the near model comes of the lines alone.
 const NEAR_IS_ALL: f64 = 1.2;
-/// Ends of a line: beyond them lies less than 1e-10.
-const REACH: f64 = 6.5;
-/// Intervals of a line at first.
-const INTERVALS: usize = 13;
-/// How closely a place is found at which a limit is passed.
-const PLACE: f64 = 1e-4;
-/// Most steps to a place.
-const MOST_STEPS: usize = 24;
+/// Most lines of a scrambling on which a costly model is asked.
+const MOST_COSTLY: usize = 4;
 
 /// By how much limits are kept, negative where one is not; infinite where there is none.
 pub(crate) type Margins<const K: usize> = [f64; K];
 
 /// Numbers of independent standard normal scores.
 pub(crate) type Values<'a, const N: usize> = dyn FnMut(&[f64]) -> Result<[f64; N], Failure> + 'a;
+
+/// The scores at a place of a line.
+type PlacesOfLine<'a> = dyn Fn(f64) -> Vec<f64> + 'a;
+
+/// A line of the real model, made with the near one.
+type RealLine<'a, const K: usize> = dyn FnMut(&mut Values<'_, K>, &PlacesOfLine<'_>) -> Result<Line<K>, Failure> + 'a;
 
 /// Limits that are kept together, by their places among the margins.
 pub(crate) type Together = RangeInclusive<usize>;
@@ -106,13 +107,38 @@ impl<const S: usize> Question<'_, S> {
         real: &mut Values<'_, K>,
         near: &mut Values<'_, K>,
     ) -> Result<Found<S>, Failure> {
+        self.of_both(usize::MAX, near, &mut |_, at| Line::scanned(&mut |place| real(&at(place))))
+    }
+
+    /// The same of a real model that costs much. On its lines it is asked only near the places where the near model passes a limit: it
+    /// is taken to pass each limit as often as that does, as two models do that differ by little.
+    pub(crate) fn of_costly<const K: usize>(
+        &self,
+        real: &mut Values<'_, K>,
+        near: &mut Values<'_, K>,
+    ) -> Result<Found<S>, Failure> {
+        self.of_both(MOST_COSTLY, near, &mut |near, at| {
+            let mut nearly = |place: f64| near(&at(place));
+            let line = Line::scanned(&mut nearly)?;
+            line.moved(&mut |place| real(&at(place)), &mut nearly)
+        })
+    }
+
+    /// Most lines by the near model; `line` makes some of them by the real one, `most` of a scrambling.
+    fn of_both<const K: usize>(
+        &self,
+        most: usize,
+        near: &mut Values<'_, K>,
+        line: &mut RealLine<'_, K>,
+    ) -> Result<Found<S>, Failure> {
         let mut nearly = Lines::of(self);
         nearly.until(NEAR_SHARE, near)?;
         let near_error = nearly.found(nearly.done()).of[S - 1].error;
         let mut really = Lines::of(self);
-        let mut count = FIRST_LINES[1].min(nearly.done());
+        let most = most.min(nearly.done());
+        let mut count = FIRST_LINES[1].min(most);
         loop {
-            really.extend(count, real)?;
+            really.extend_by(count, &mut |at| line(near, at))?;
             let found = Found {
                 of: std::array::from_fn(|set| {
                     let (all, asked, more) =
@@ -123,10 +149,10 @@ impl<const S: usize> Question<'_, S> {
             };
             let last = found.of[S - 1];
             // More lines of the real model would not lower an error that both models share.
-            if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= nearly.done() {
+            if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= most {
                 return Ok(found);
             }
-            count = (2 * count).min(nearly.done());
+            count = (2 * count).min(most);
         }
     }
 }
@@ -152,12 +178,20 @@ impl<'a, const S: usize> Lines<'a, S> {
 
     /// Asks up to so many lines of every scrambling.
     fn extend<const K: usize>(&mut self, count: usize, margins: &mut Values<'_, K>) -> Result<(), Failure> {
+        self.extend_by(count, &mut |at| Line::scanned(&mut |place| margins(&at(place))))
+    }
+
+    fn extend_by<const K: usize>(
+        &mut self,
+        count: usize,
+        line: &mut dyn FnMut(&PlacesOfLine<'_>) -> Result<Line<K>, Failure>,
+    ) -> Result<(), Failure> {
         let Question { sets, effort, monitor, .. } = self.question;
         for (scrambling, lines) in self.of.iter_mut().enumerate() {
             for index in lines.len()..count {
                 checkpoint(*monitor)?;
                 let start = self.frame.across(index, effort.scrambled(scrambling));
-                let line = Line::scanned(&mut |place| margins(&self.frame.at(&start, place)))?;
+                let line = line(&|place| self.frame.at(&start, place))?;
                 lines.push(sets.clone().map(|set| line.probability(set)));
             }
         }
@@ -324,12 +358,6 @@ impl Sampled {
     }
 }
 
-/// Places along a line at which is looked first.
-fn places() -> impl Iterator<Item = f64> {
-    let step = 2.0 * REACH / INTERVALS as f64;
-    (0..=INTERVALS).map(move |index| step.mul_add(index as f64, -REACH))
-}
-
 fn between_nodes<const N: usize>(nodes: &[(f64, [f64; N])], place: f64) -> [f64; N] {
     let after = nodes.partition_point(|node| node.0 <= place).clamp(1, nodes.len() - 1);
     let [(from, before), (to, behind)] = [nodes[after - 1], nodes[after]];
@@ -397,114 +425,11 @@ impl Frame {
     }
 }
 
-/// A line: which limits are kept between which places.
-struct Line<const K: usize> {
-    /// Whether each is kept at the beginning.
-    begins: [bool; K],
-    /// Where each is passed, ascending.
-    passed: [Vec<f64>; K],
-}
-
-impl<const K: usize> Line<K> {
-    fn scanned(margins: &mut dyn FnMut(f64) -> Result<Margins<K>, Failure>) -> Result<Self, Failure> {
-        let mut nodes = Vec::with_capacity(2 * INTERVALS);
-        for place in places() {
-            nodes.push((place, margins(place)?));
-        }
-        // Between two nodes a limit may be kept that is passed at both.
-        for limit in 0..K {
-            for middle in (1..nodes.len() - 1).rev() {
-                let [left, here, right] = [nodes[middle - 1], nodes[middle], nodes[middle + 1]];
-                let [a, b, c] = [left.1[limit], here.1[limit], right.1[limit]];
-                if b < 0.0 && a < 0.0 && c < 0.0 && b >= a && b >= c {
-                    let place = vertex([left.0, here.0, right.0], [a, b, c]);
-                    let at = if place < here.0 { middle } else { middle + 1 };
-                    nodes.insert(at, (place, margins(place)?));
-                }
-            }
-        }
-        let mut passed: [Vec<f64>; K] = std::array::from_fn(|_| Vec::new());
-        for pair in nodes.windows(2) {
-            for (limit, places) in passed.iter_mut().enumerate() {
-                let ends = [(pair[0].0, pair[0].1[limit]), (pair[1].0, pair[1].1[limit])];
-                if (ends[0].1 >= 0.0) != (ends[1].1 >= 0.0) {
-                    places.push(root(ends, &mut |place| Ok(margins(place)?[limit]))?);
-                }
-            }
-        }
-        Ok(Self { begins: nodes[0].1.map(|margin| margin >= 0.0), passed })
-    }
-
-    /// The probability that limits are kept together.
-    fn probability(&self, limits: Together) -> f64 {
-        let mut kept = self.begins;
-        let mut places: Vec<(f64, usize)> =
-            limits.clone().flat_map(|limit| self.passed[limit].iter().map(move |&place| (place, limit))).collect();
-        places.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all = |kept: &[bool; K]| limits.clone().all(|limit| kept[limit]);
-        let (mut from, mut sum) = (f64::NEG_INFINITY, 0.0);
-        for (place, limit) in places {
-            if all(&kept) {
-                sum += between(from, place);
-            }
-            kept[limit] = !kept[limit];
-            from = place;
-        }
-        if all(&kept) { sum + between(from, f64::INFINITY) } else { sum }
-    }
-}
-
-/// Probability that a standard normal number lies between two: from the side on which the difference keeps its digits.
-fn between(from: f64, to: f64) -> f64 {
-    if from > 0.0 { normal_below(-from) - normal_below(-to) } else { normal_below(to) - normal_below(from) }
-}
-
-/// Where the parabola through three points has its top, within them; the middle one where it has none.
-fn vertex(x: [f64; 3], y: [f64; 3]) -> f64 {
-    let (left, right) = (x[1] - x[0], x[2] - x[1]);
-    let (down, up) = ((y[1] - y[0]) / left, (y[2] - y[1]) / right);
-    let curvature = (up - down) / (left + right);
-    let place = 0.5 * (x[0] + x[1]) - 0.5 * down / curvature;
-    if place.is_finite() && place > x[0] && place < x[2] { place } else { x[1] }
-}
-
-/// Where a margin passes 0 between two places of different sign: false position with the weight of a stuck end halved
-/// (Illinois).
-fn root(ends: [(f64, f64); 2], margin: &mut dyn FnMut(f64) -> Result<f64, Failure>) -> Result<f64, Failure> {
-    let [mut a, mut b] = ends;
-    for _ in 0..MOST_STEPS {
-        // An end without an answer is infinitely far from keeping the limit.
-        let secant = (a.1 * b.0 - b.1 * a.0) / (a.1 - b.1);
-        let place = if secant.is_finite() { secant } else { 0.5 * (a.0 + b.0) };
-        if (b.0 - a.0).abs() < PLACE {
-            return Ok(place);
-        }
-        let value = margin(place)?;
-        if value.abs() <= 0.0 {
-            return Ok(place);
-        }
-        if (value >= 0.0) == (b.1 >= 0.0) {
-            let is_close = (place - b.0).abs() < PLACE;
-            b = (place, value);
-            a.1 *= 0.5;
-            if is_close {
-                return Ok(place);
-            }
-        } else {
-            let is_close = (place - b.0).abs() < PLACE;
-            a = b;
-            b = (place, value);
-            if is_close {
-                return Ok(place);
-            }
-        }
-    }
-    Ok(b.0)
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use super::super::line::between;
+    use super::super::normal_below;
     use super::*;
     use crate::calculator::Unwatched;
 
@@ -559,6 +484,27 @@ mod tests {
             let error = alone.error.hypot(beside.error);
             assert!((alone.probability - beside.probability).abs() < 1.5 * error + 1e-5, "{alone:?} {beside:?}");
         }
+    }
+
+    #[test]
+    fn a_costly_model_is_asked_little_and_decides_alone() {
+        // The near model has another curvature, and is somewhat off.
+        let real = |g: &[f64]| [1.0 - g[0] - 0.1 * g[1] * g[1] + 0.05 * g[0] * g[0], 2.0 + g[0] + 0.1 * g[1]];
+        let near = |g: &[f64]| [1.1 - 1.05 * g[0] - 0.08 * g[1] * g[1], 2.1 + 0.95 * g[0]];
+        let question = Question { axis: &[1.0, 0.1], sets: [0..=0, 0..=1], effort: EFFORT, monitor: &Unwatched };
+        let alone = question.of(&mut |g| Ok(real(g))).unwrap();
+        let mut asked = 0;
+        let mut counted = |g: &[f64]| {
+            asked += 1;
+            Ok(real(g))
+        };
+        let beside = question.of_costly(&mut counted, &mut |g| Ok(near(g))).unwrap();
+        for (alone, beside) in alone.of.into_iter().zip(beside.of) {
+            let error = alone.error.hypot(beside.error);
+            assert!((alone.probability - beside.probability).abs() < 1.5 * error + 2e-4, "{alone:?} {beside:?}");
+        }
+        // Two limits on a line, each found in three steps.
+        assert!(asked <= 6 * beside.lines, "{asked} {}", beside.lines);
     }
 
     #[test]

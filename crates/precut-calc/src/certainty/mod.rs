@@ -6,6 +6,7 @@
 
 mod answer;
 mod distribution;
+mod line;
 pub(crate) mod lines;
 pub(crate) mod picture;
 mod quantities;

@@ -1,11 +1,11 @@
 //! What dominates, what would help, where not to trust: codes with numbers.
 
 use crate::calculator::{Failure, Finding, Message, Monitor};
+use crate::diameters;
 use crate::force::{Reached, ReachedCut};
 
 use super::acting::Acting;
 use super::auto::settled;
-use super::conformance;
 use super::driven::Again;
 use super::encounters::{Reach, body, met};
 use super::extremes::Extremes;
@@ -228,7 +228,7 @@ pub(super) fn explanation(job: &Job, outcome: &Outcome, seen_along: &SeenAlong) 
     };
     if let Some(conformance) = &outcome.conformance {
         let place = usize::from(said.len() > 2);
-        said.splice(place..place, conformance::said(conformance));
+        said.splice(place..place, diameters::said(conformance));
     }
     if let Some(path) = &outcome.path {
         said.push(match (outcome.form_error_after_um, outcome.largest_error_after_um) {
@@ -455,7 +455,7 @@ pub(super) fn warnings(
     }
     found.extend(missed_tolerances(job, outcome));
     found.extend(soundness::warnings(job, grid, stage, outcome, uncertainty_um));
-    found.extend(outcome.conformance.iter().flat_map(|found| conformance::warnings(job, found)));
+    found.extend(outcome.conformance.iter().flat_map(|found| diameters::warnings(&job.asked(), found)));
     found
 }
 

@@ -1,12 +1,12 @@
 //! Rules between fields. What one field alone may hold stands in its schema.
 
 use crate::calculator::{Check, Finding, Violations};
+use crate::diameters::{self, Aim};
 use crate::effects::DeflectionEffect as Effect;
 
 use super::formula;
 use super::grid::{interpolate, station_count};
-use super::input::{Aim, Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
-use super::uncertain;
+use super::input::{Job, MAX_STATIONS, Segment, Stations, StockRow, Support};
 use crate::force::ForceModel;
 use crate::shaft::{self, DIAMETER_MM, elastic::clamping, elastic::ends, places};
 
@@ -56,7 +56,7 @@ impl Check for Job {
         check_stock_profile(self, violations);
         self.force.check("/force", violations);
         check_effects(self, violations);
-        uncertain::check(self, violations);
+        diameters::check(&self.asked(), violations);
         let aims = !matches!(self.aim, Aim::Nominal {});
         violations.require(!aims || self.tolerance.size().middle_um().is_some(), || {
             Finding::new("aim_without_size_limits", "/aim")

@@ -3,11 +3,12 @@
 
 use super::UM_PER_MM;
 use super::acting::Acting;
-use super::input::{Detail, Job, Uncertainty};
+use super::input::{Detail, Job};
 use super::laws::Loads;
 use super::model::{Line, Radii, at};
 use super::output::StationColumns;
 use super::stage::Stage;
+use crate::diameters::Uncertainty;
 
 /// Diameter errors at the stations, um.
 pub(super) struct Errors {

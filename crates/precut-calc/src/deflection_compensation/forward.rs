@@ -8,6 +8,7 @@ use crate::calculator::{
     JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
     TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
+use crate::diameters::{Aim, Tolerance};
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
 use crate::num::beam::Profile;
 use crate::shaft::places;
@@ -19,7 +20,7 @@ use super::consequence::{compensated, consequences, corners};
 use super::equilibrium::Engagement;
 use super::grid::{Grid, interpolate};
 use super::hypotheses::{Experiment, chuck_scale_n_mm_per_rad, design, remainder_name};
-use super::input::{Aim, FeedDirection, IncludeMode, Job, Stations, Theory, Tolerance};
+use super::input::{FeedDirection, IncludeMode, Job, Stations, Theory};
 use super::measurement::DeflectionMeasurement;
 use super::model::{Ingredients, Line, Radii, wanted};
 use super::next_runs::next_runs;

@@ -4,6 +4,7 @@
 //! forces come from elsewhere, move by move.
 
 use crate::calculator::{Failure, Violations};
+use crate::diameters::Draw;
 use crate::force::{DepthLaw, ForceModel};
 
 use super::acting::{Acting, Passage};
@@ -30,6 +31,8 @@ pub(crate) struct Holding {
     pub(crate) gravity: super::input::Gravity,
     pub(crate) effects: Vec<crate::effects::DeflectionEffect>,
     pub(crate) conditions: crate::effects::DeflectionConditions,
+    /// How it differs from what is stated; what holds it differs already.
+    pub(crate) draw: Draw,
 }
 
 /// A stretch of the work, from the headstock end on.
@@ -78,6 +81,7 @@ pub(crate) struct Push {
 
 /// Work that is held while the tool makes a move.
 pub(crate) struct Held {
+    draw: Draw,
     job: Job,
     acting: Acting,
     structure: Structure,
@@ -136,9 +140,9 @@ impl Holding {
             stock_profile: None,
             passes: Vec::new(),
             detail: Detail::Profile,
-            tolerance: super::input::Tolerance::default(),
-            aim: super::input::Aim::default(),
-            uncertainty: super::input::Uncertainty::default(),
+            tolerance: crate::diameters::Tolerance::default(),
+            aim: crate::diameters::Aim::default(),
+            uncertainty: crate::diameters::Uncertainty::default(),
             path: super::input::PathSettings::default(),
             program: super::input::ProgramSettings::default(),
             limits: super::input::Limits::default(),
@@ -147,6 +151,13 @@ impl Holding {
             effects: self.effects.clone(),
             conditions: self.conditions.clone(),
         }
+    }
+
+    /// The same, not quite as it is stated.
+    pub(crate) fn drawn(&self, draw: &Draw) -> Self {
+        let mut drawn = Self { draw: *draw, ..self.clone() };
+        draw.yield_in(&mut drawn.supports, &mut drawn.carriage);
+        drawn
     }
 
     /// Whether these of the supports hold the work.
@@ -167,6 +178,7 @@ impl Holding {
         let supports = self.supports.iter().zip(acts).filter(|(_, acts)| **acts).map(|(support, _)| support.clone());
         let job = self.job(slices.iter().map(segment).collect(), supports.collect(), direction);
         let mut acting = Acting::of(&job.effects, &job.conditions, direction);
+        acting.structure.flexibility /= self.draw.youngs_modulus;
         // What is not there yet is not set off.
         if acts.contains(&false) {
             acting.set_off.clear();
@@ -175,7 +187,7 @@ impl Holding {
         variant.section = Section::Mixed;
         let structure = Structure::of(&job, &variant)?;
         let length_mm = slices.iter().map(|slice| slice.length_mm).sum();
-        Ok(Held { job, acting, structure, direction, length_mm })
+        Ok(Held { draw: self.draw, job, acting, structure, direction, length_mm })
     }
 }
 
@@ -228,7 +240,12 @@ impl Held {
             passages: &passages,
             displaced: displaced.as_ref(),
         };
-        let line = Line::of(&ingredients, profile);
+        let mut line = Line::of(&ingredients, profile);
+        let [_, weight] = self.draw.loads();
+        if self.draw != Draw::STATED {
+            line.widen_gaps(self.draw.rest_gap_mm);
+            line = line.under(1.0, weight);
+        }
         self.acting.values(&line, &passages)?;
         Ok(Gaps { line, direction: self.direction, index })
     }
@@ -252,7 +269,9 @@ impl Held {
     pub(crate) fn law(&self, force: &ForceModel, z_mm: f64, feed_mm_per_rev: f64, speed_m_per_min: f64) -> DepthLaw {
         let change = &self.acting.force;
         let factor = change.factor(z_mm / self.length_mm, feed_mm_per_rev, speed_m_per_min);
-        law_at(force, feed_mm_per_rev, speed_m_per_min, factor, change)
+        let law = law_at(force, feed_mm_per_rev, speed_m_per_min, factor, change);
+        let [load, _] = self.draw.loads();
+        if self.draw == Draw::STATED { law } else { law.scaled(load) }
     }
 }
 

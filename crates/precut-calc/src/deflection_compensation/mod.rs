@@ -12,19 +12,18 @@
 //! `driven`: `toolpath` and what it gives and meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
 //! `forward` gives the same model to the diagnosis, `held` to a program that is there.
 
-mod acceptance;
 mod acting;
 mod advice;
 mod auto;
 mod check;
 mod columns;
-mod conformance;
 mod consequence;
 mod cut;
 mod driven;
 mod encounters;
 mod equilibrium;
 mod extremes;
+mod fan;
 mod form;
 mod formula;
 mod forward;
@@ -46,8 +45,11 @@ mod soundness;
 mod stage;
 mod structure;
 mod toolpath;
-mod uncertain;
 
+pub use crate::diameters::{
+    Aim, DeflectionCorrelation, DeflectionQuantity, DeflectionUncertainQuantity, GaugeUncertainty, Tolerance,
+    Uncertainty,
+};
 pub use auto::Automatic;
 pub(crate) use check::EFFECT_CODES;
 pub(crate) use encounters::{Reach, chuck_in_the_way, met};
@@ -57,9 +59,9 @@ pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun, Prepared
 pub(crate) use forward::{GAUGE_STEP_MM, Measure, QUANTITIES, RELATIVE_STEP, columns_of_runs, difference};
 pub(crate) use held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
 pub use input::{
-    Aim, Carriage, Cut, Detail, FeedDirection, GaugeUncertainty, Gravity, Include, IncludeMode, Job, Limits,
-    MAX_STATIONS, Pass, PathSettings, ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft,
-    SpeedDiameter, Stations, StockRow, Support, Theory, Tolerance, Uncertainty,
+    Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass, PathSettings,
+    ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support,
+    Theory,
 };
 pub use measurement::DeflectionMeasurement;
 pub(crate) use measurement::{first, measured_diameters};
@@ -68,13 +70,13 @@ pub use output::{
     AddedSupport, ErrorFan, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares,
     StationColumns, StatusCompensated, StatusUncompensated,
 };
-pub use uncertain::{DeflectionCorrelation, DeflectionQuantity, DeflectionUncertainQuantity};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
     Program, ProgramOrigin, Table,
 };
 use crate::certainty::{self, Conformance};
+use crate::diameters::{self, Judged};
 use crate::force;
 use crate::shaft::places;
 use crate::turning::Proof;
@@ -82,7 +84,6 @@ use crate::turning::Proof;
 use acting::Acting;
 use advice::SeenAlong;
 use columns::{Errors, columns, uncertainty_um};
-use conformance::Judged;
 use cut::one_step;
 use driven::{Driven, drive};
 use grid::{Grid, path_station_count, station_count};
@@ -289,7 +290,7 @@ fn aimed<'a>(
     let mut sure = Sure::default();
     if job.aim != (Aim::Nominal {}) {
         let judged = match &driven.rehearsal {
-            Some(rehearsal) => Judged::of(job, rehearsal, monitor)?,
+            Some(rehearsal) => Judged::of(job.asked(), rehearsal, monitor)?,
             None => None,
         };
         sure.aim_um = match judged {
@@ -300,7 +301,7 @@ fn aimed<'a>(
     }
     if let Some(rehearsal) = &driven.rehearsal {
         // The path of the rehearsal is aimed already.
-        if let Some(judged) = Judged::of(job, rehearsal, monitor)? {
+        if let Some(judged) = Judged::of(job.asked(), rehearsal, monitor)? {
             sure.conformance = Some(judged.conformance(0.0)?);
             sure.fan = Some(judged.fan(0.0)?);
         }
@@ -389,7 +390,7 @@ const CODES: Codes = Codes {
     faults: &[
         check::CODES,
         check::EFFECT_CODES,
-        uncertain::CODES,
+        diameters::CODES,
         certainty::DISTRIBUTION_CODES,
         certainty::QUANTITY_CODES,
         crate::shaft::check::CODES,
@@ -409,17 +410,16 @@ const CODES: Codes = Codes {
     ],
     warnings: &[
         advice::WARNING_CODES,
-        conformance::WARNING_CODES,
-        acceptance::WARNING_CODES,
+        diameters::WARNING_CODES,
         soundness::WARNING_CODES,
         second_order::WARNING_CODES,
         force::WARNING_CODES,
     ],
-    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, acceptance::EXPLANATION_CODES],
+    explanations: &[advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
     labels: &[
         picture::LABEL_CODES,
-        picture::DOUBT_LABELS,
+        diameters::DOUBT_LABELS,
         certainty::picture::LABEL_CODES,
         crate::shaft::handles::LABEL_CODES,
     ],

@@ -2,6 +2,7 @@
 
 use crate::calculator::{Along, Axis, Column, Figure, Frame, Glyph, Item, Message, Panel, Role, Table};
 use crate::certainty::picture as doubt;
+use crate::diameters::DOUBT_LABELS;
 
 use super::columns::offsets_um;
 use super::input::{Job, Support};
@@ -13,21 +14,6 @@ const Z: Axis = Axis::linear("station", "mm");
 
 pub(super) const FIGURE_IDS: &[&str] = &["profile", "compliance", "path", doubt::ID];
 pub(super) const TABLE_IDS: &[&str] = &["stations", "path", "increments", "one_step", "passes", doubt::ID];
-
-/// Codes of what may be doubted, in the picture of the doubt.
-pub(super) const DOUBT_LABELS: &[&str] = &[
-    "doubt_force",
-    "doubt_stiffness",
-    "doubt_youngs_modulus",
-    "doubt_headstock_compliance",
-    "doubt_tailstock_compliance",
-    "doubt_rest_compliance",
-    "doubt_carriage_compliance",
-    "doubt_rest_gap",
-    "doubt_tool_setting",
-    "doubt_stock_diameter",
-    "doubt_spindle_scatter",
-];
 
 /// Codes that the figures utter.
 pub(super) const LABEL_CODES: &[&str] = &[

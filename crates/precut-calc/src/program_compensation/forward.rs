@@ -18,10 +18,10 @@ use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect};
 
 use super::ProgramCompensation;
 use super::job::{Job, SupportLines};
+use super::made::{Made, drive_ms, drive_ms_of};
 use super::measurement::ProgramMeasurement;
-use super::model::reader::{self, Program};
-use super::model::stock::{Part, lines_that_finish, turned};
-use super::model::yielding::{Driven, Yielded, radius_at, yielding};
+use super::model::stock::Part;
+use super::model::yielding::radius_at;
 
 /// Conditions of one part; what it leaves out is as in the job.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -83,50 +83,10 @@ pub struct PreparedProgram {
 
 /// A part, its program and the places at which it was measured.
 struct PreparedRun {
-    job: Job,
-    program: Program,
-    /// Lines that make the contour.
-    finishing: Vec<usize>,
-    /// As it is without further effects: moves are looked at where they were then.
-    base: Yielded,
+    part: Made,
     /// Its rows, and the station of each.
     rows: Vec<usize>,
     z_mm: Vec<f64>,
-}
-
-impl PreparedRun {
-    /// Reads and drives a program once.
-    fn of(job: Job, monitor: &dyn Monitor) -> Result<Self, Failure> {
-        let program = reader::read(&job.nc_program, job.dialect, &job.reading, monitor)?;
-        let (stock, zero) = blank(&job)?;
-        let finishing = lines_that_finish(&turned(&program, &job, (stock, zero), monitor)?);
-        let mut run = Self { job, program, finishing, base: Yielded::default(), rows: Vec::new(), z_mm: Vec::new() };
-        run.base = run.driven(&[], None, monitor)?;
-        Ok(run)
-    }
-
-    /// What it leaves with effects beside those of the job.
-    fn driven(
-        &self,
-        effects: &[DeflectionEffect],
-        places_of: Option<&Yielded>,
-        monitor: &dyn Monitor,
-    ) -> Result<Yielded, Failure> {
-        let mut holding = self.job.holding().ok_or_else(without_force)?;
-        holding.effects.extend_from_slice(effects);
-        let driven = Driven { places_of, ..Driven::as_it_is(&self.finishing) };
-        yielding(&self.program, &self.job, &holding, blank(&self.job)?, driven, monitor)
-    }
-}
-
-/// Blank and program zero.
-fn blank(job: &Job) -> Result<(&super::job::ProgramStock, f64), Failure> {
-    job.stock.as_ref().zip(job.program_zero_z_mm).ok_or_else(without_force)
-}
-
-/// Nothing is predicted of work that nothing bends.
-fn without_force() -> Failure {
-    Failure::OutOfModel(Finding::new("prediction_without_force", "/job/force"))
 }
 
 impl PreparedProgram {
@@ -141,8 +101,8 @@ impl PreparedProgram {
         for run in &self.runs {
             checkpoint(monitor)?;
             // Without further effects it is what it was.
-            let own = if effects.is_empty() { None } else { Some(run.driven(effects, Some(&run.base), monitor)?) };
-            let real = own.as_ref().map_or(&run.base.real, |own| &own.real);
+            let own = if effects.is_empty() { None } else { Some(run.part.with_effects(effects, monitor)?) };
+            let real = own.as_ref().map_or(&run.part.base.real, |own| &own.real);
             for (into, shift) in found.iter_mut().zip(shifts_mm) {
                 for (&row, z) in run.rows.iter().zip(&run.z_mm) {
                     let [left, meant] = [real, &self.nominal].map(|parts| radius_at(parts, z + shift));
@@ -176,21 +136,15 @@ impl PreparedProgram {
         effects: &[DeflectionEffect],
         monitor: &dyn Monitor,
     ) -> Result<Option<JacobianColumn>, Failure> {
-        let has_shear =
-            |run: &PreparedRun| run.job.stock.as_ref().is_some_and(|stock| stock.theory == Some(Theory::Timoshenko));
+        let has_shear = |run: &PreparedRun| {
+            run.part.job.stock.as_ref().is_some_and(|stock| stock.theory == Some(Theory::Timoshenko))
+        };
         if self.runs.iter().any(has_shear) {
             return Ok(None);
         }
         let mut column = vec![0.0; self.rows];
         for run in &self.runs {
-            let mut holding = run.job.holding().ok_or_else(without_force)?;
-            holding.effects.extend_from_slice(effects);
-            let places_of = Some(&run.base);
-            let mut drive = |theory| {
-                holding.shaft.theory = Some(theory);
-                let driven = Driven { places_of, ..Driven::as_it_is(&run.finishing) };
-                yielding(&run.program, &run.job, &holding, blank(&run.job)?, driven, monitor)
-            };
+            let drive = |theory| run.part.with_theory(theory, effects, monitor);
             let [without, with] = [drive(Theory::EulerBernoulli)?, drive(Theory::Timoshenko)?];
             for (&row, z) in run.rows.iter().zip(&run.z_mm) {
                 let [with, without] = [&with, &without].map(|of| self.measure.of(radius_at(&of.real, *z), 0.0));
@@ -249,7 +203,7 @@ impl ForwardModel for ProgramCompensation {
         let places: Vec<(usize, f64)> = rows.points.iter().map(|(run, point)| (*run, point.z_mm)).collect();
         let of_runs = rows.runs.iter().map(ProgramRun::conditions).collect();
         let causes = PreparedDeflection::of_causes(holding.work(), of_runs, places.clone(), measure);
-        let given = PreparedRun::of(job.clone(), monitor).map_err(|failure| failed_at(failure, "/job"))?;
+        let given = Made::of(job.clone(), monitor).map_err(|failure| failed_at(failure, "/job"))?;
         let mut runs = Vec::new();
         for (k, conditions) in rows.runs.iter().enumerate() {
             let own = || places.iter().enumerate().filter(move |(_, (run, _))| *run == k);
@@ -257,10 +211,9 @@ impl ForwardModel for ProgramCompensation {
                 continue;
             }
             let place = if conditions.nc_program.is_some() { format!("/runs/{k}") } else { "/job".to_owned() };
-            let run = PreparedRun::of(conditions.job(job), monitor);
-            let mut run = run.map_err(|failure| failed_at(failure, &place))?;
-            (run.rows, run.z_mm) = own().map(|(row, (_, z))| (row, *z)).unzip();
-            runs.push(run);
+            let part = Made::of(conditions.job(job), monitor).map_err(|failure| failed_at(failure, &place))?;
+            let (rows, z_mm) = own().map(|(row, (_, z))| (row, *z)).unzip();
+            runs.push(PreparedRun { part, rows, z_mm });
         }
         Ok(PreparedProgram { causes, measure, nominal: given.base.nominal, runs, rows: places.len() })
     }
@@ -297,14 +250,9 @@ impl ForwardModel for ProgramCompensation {
     }
 
     fn predict_cost(prepared: &PreparedProgram) -> Cost {
-        let ms = prepared.runs.iter().map(|run| drive_ms(run.program.lines)).sum();
+        let ms = prepared.runs.iter().map(|run| drive_ms(&run.part.program, &run.part.job)).sum();
         Cost { ms, bytes: 1_000_000 * prepared.runs.len() as u64, driver: "/job/nc_program" }
     }
-}
-
-/// Time of one drive of a program of so many lines, ms (measured).
-fn drive_ms(lines: usize) -> f64 {
-    0.1 * lines as f64
 }
 
 impl Diagnosable for ProgramCompensation {
@@ -376,6 +324,6 @@ impl Diagnosable for ProgramCompensation {
     }
 
     fn predict_ms(job: &Job) -> f64 {
-        drive_ms(job.nc_program.lines().count())
+        drive_ms_of(job)
     }
 }

@@ -1,12 +1,14 @@
 //! The program that a shop has already (`program`): read as its control reads it.
 //!
 //! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves; the blank, rigid and yielding) -> `answer` (moves,
-//! errors, the corrected program, pictures, what is said). `forward` is the model as a function of its effects, for parts that were
+//! errors, the corrected program, pictures, what is said). `conformance` is how probable it is that the parts are good, `forward` the model as a function of its effects, for parts that were
 //! measured.
 
 mod answer;
+mod conformance;
 mod forward;
 mod job;
+mod made;
 mod measurement;
 mod model;
 
@@ -28,8 +30,14 @@ use crate::calculator::{
     Monitor, ProgramOrigin, ReturnedProgram, Table,
 };
 
+use crate::certainty::{self, Conformance};
+use crate::diameters;
+
 use answer::{advice, output, picture, returned};
 use model::{correction, reader, refeed, stock, yielding};
+
+/// Drives that a probability takes, about (measured).
+const SURE_DRIVES: f64 = 180.0;
 
 /// Reads programs for lathes.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +50,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -71,13 +79,18 @@ impl Calculator for ProgramCompensation {
                 job: include_str!("examples/slender_shaft.json"),
             },
             Example {
+                id: "within_tolerance",
+                title: "The same shaft with a tolerance: how probably a part of the corrected program keeps it",
+                job: include_str!("examples/within_tolerance.json"),
+            },
+            Example {
                 id: "faster_feeds",
                 title: "The same shaft: first the fastest feeds within its limits, then X at those",
                 job: include_str!("examples/faster_feeds.json"),
             },
         ],
         hallmarks: &[Hallmark::Of("/dialect"), Hallmark::Of("/mode/kind")],
-        study_outputs: &["/feed_moves", "/feed_length_mm"],
+        study_outputs: &["/feed_moves", "/feed_length_mm", "/conformance/joint/probability"],
         codes: CODES,
         figures: picture::FIGURE_IDS,
         tables: picture::TABLE_IDS,
@@ -93,12 +106,14 @@ impl Calculator for ProgramCompensation {
         let read_ms = 1.0 + 2e-3 * lines as f64 + 2e-4 * bytes as f64;
         // Over a blank a move is held against what it comes near to, however long the program is (measured).
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
-        // Where the work yields, every move bends a beam of its own; far from the tool that has few sections (measured).
-        let yielding_ms = if job.force.is_some() { 0.08 * lines as f64 } else { 0.0 };
+        // Where the work yields, every move bends a beam of its own.
+        let yielding_ms = if job.force.is_some() { made::drive_ms_of(job) } else { 0.0 };
         // A correction drives it again as it should come out, and what comes of it once or a few times.
         let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
         // New feeds drive it until the schedule and what comes out at its feeds are one.
         let drives = if job.mode.kind.refeeds() { drives + 10.0 } else { drives };
+        // How sure the parts are takes drives of its own: for a response surface, and on lines through what is uncertain.
+        let drives = if job.tolerance.is_none() { drives } else { drives + SURE_DRIVES };
         Cost {
             ms: read_ms + drives * (turned_ms + yielding_ms),
             // A line makes four moves at most; cycles over a contour make some more.
@@ -141,7 +156,7 @@ impl Calculator for ProgramCompensation {
         let driven = turned.as_ref().zip(yielded.as_ref());
         let refed = refed(&program, job, driven, monitor)?;
         let corrected = match (&refed, driven) {
-            (Some(refed), _) if !job.mode.kind.compensates() => Some(refed.alone(&job.nc_program)),
+            (Some(refed), _) if !job.mode.kind.compensates() => Some(refed.alone(job)),
             // Feeds change no line's place: supports, contour and blank are those of the given program.
             (Some(refed), Some((turned, _))) => {
                 let mut again = job.clone();
@@ -155,13 +170,16 @@ impl Calculator for ProgramCompensation {
         if job.mode.kind != ModeKind::Read && corrected.is_none() {
             warnings.push(Finding::new("program_unsafe", "/nc_program"));
         }
-        let output = output::outcome(
+        let conformance = sure(job, (turned.as_ref(), yielded.as_ref()), corrected.as_ref(), monitor)?;
+        let mut output = output::outcome(
             &program,
             &job.drawing,
             (turned.as_ref(), yielded.as_ref()),
             (corrected.as_ref(), refed.as_ref()),
         );
+        output.conformance = conformance;
         warnings.extend(advice::far_from_drawing(&output, job.mode.correct_to));
+        warnings.extend(output.conformance.iter().flat_map(|sure| diameters::warnings(&job.asked(), sure)));
         let explanation = advice::explanation(&output, job.mode.correct_to);
         monitor.progress(1.0, Message::new("stage_done"));
         Ok(Answer { output, warnings, explanation, basis: basis(job) })
@@ -177,7 +195,8 @@ impl Calculator for ProgramCompensation {
 
     fn returned(job: &Job, outcome: &Outcome, made_by: &str) -> Option<Result<ReturnedProgram, Failure>> {
         let nothing = || Failure::OutOfModel(Finding::new("no_program_returned", "/mode/kind"));
-        Some(outcome.compensation.as_ref().map(|one| returned::returned(job, one, made_by)).ok_or_else(nothing))
+        let kept = outcome.conformance.as_ref().map(|sure| sure.joint.probability);
+        Some(outcome.compensation.as_ref().map(|one| returned::returned(job, one, (made_by, kept))).ok_or_else(nothing))
     }
 }
 
@@ -232,6 +251,22 @@ fn refed(
     }
 }
 
+/// How sure the parts are to come out well, where their limits are given.
+fn sure(
+    job: &Job,
+    (turned, yielded): (Option<&stock::Turned>, Option<&yielding::Yielded>),
+    corrected: Option<&correction::Corrected>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Conformance>, Failure> {
+    match (turned.zip(job.stock.as_ref()), yielded) {
+        (Some((turned, stock)), Some(yielded)) if is_safe(turned, stock) && !job.tolerance.is_none() => {
+            monitor.progress(0.8, Message::new("stage_program_certainty"));
+            conformance::conformance(job, corrected, &yielded.nominal, monitor)
+        }
+        _ => Ok(None),
+    }
+}
+
 /// Whether nothing speaks against a program on its blank.
 fn is_safe(turned: &stock::Turned, stock: &ProgramStock) -> bool {
     turned.in_stock.is_empty() && turned.hits.is_empty() && stock::doubt(turned, stock).is_none()
@@ -248,6 +283,12 @@ fn basis(job: &Job) -> Vec<Basis> {
     }
     if job.mode.kind.refeeds() {
         used.push(Basis { equation: "program/8", source: "geometric program through what comes out of every line" });
+    }
+    if !job.tolerance.is_none() {
+        used.push(Basis {
+            equation: "certainty/4",
+            source: "lines through what is uncertain, the program driven again",
+        });
     }
     if let Some(force) = &job.force {
         used.push(Basis { equation: "program/4", source: "cut along any direction, equilibrium at the engaged depth" });
@@ -269,6 +310,9 @@ const CODES: Codes = Codes {
         crate::shaft::check::SUPPORT_CODES,
         crate::deflection_compensation::EFFECT_CODES,
         crate::force::FAULT_CODES,
+        diameters::CODES,
+        certainty::DISTRIBUTION_CODES,
+        certainty::QUANTITY_CODES,
     ],
     failures: &[
         reader::FAULT_CODES,
@@ -282,18 +326,20 @@ const CODES: Codes = Codes {
     warnings: &[
         reader::WARNING_CODES,
         advice::WARNING_CODES,
+        diameters::WARNING_CODES,
         &["unconfirmed_force_coefficient", "edge_angle_beyond_table", "extrapolated_force_model"],
     ],
-    explanations: &[advice::EXPLANATION_CODES],
+    explanations: &[advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES],
     stages: &[&[
         "stage_reading",
         "stage_turning",
         "stage_yielding",
         "stage_refeeding",
         "stage_correcting",
+        "stage_program_certainty",
         "stage_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, diameters::DOUBT_LABELS, certainty::picture::LABEL_CODES],
 };
 
 /// How many lines a text has at most.

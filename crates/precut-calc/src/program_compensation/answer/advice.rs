@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::calculator::{Finding, Message};
+use crate::diameters;
 
 use super::super::job::{CorrectTo, Job, ProgramStock};
 use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
@@ -95,6 +96,7 @@ pub(crate) fn explanation(outcome: &Outcome, correct_to: CorrectTo) -> Vec<Messa
         let code = if is_to_drawing { "error_against_drawing" } else { "error_along_contour" };
         said.push(Message::new(code).with("smallest_error_um", smallest).with("largest_error_um", largest));
     }
+    said.extend(outcome.conformance.iter().flat_map(diameters::said));
     // What was asked for comes first.
     if let Some(compensation) = &outcome.compensation {
         said.splice(0..0, of_compensation(outcome, compensation));

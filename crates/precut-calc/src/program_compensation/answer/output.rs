@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::certainty::Conformance;
 use crate::feed_schedule::stretches::PriceOfLimit;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -60,6 +61,9 @@ pub struct Outcome {
     pub compensation: Option<CompensatedProgram>,
     /// The feeds that it was given, why, and what they bring; null where they were not asked for.
     pub refeed: Option<RefedProgram>,
+    /// How probable it is that a part keeps `tolerance` all along the contour, outside transitions: of the program that is given back, or of
+    /// the given one where none is; null without `tolerance`.
+    pub conformance: Option<Conformance>,
 }
 
 /// The fastest feeds of a program within the limits of `refeed`, as the program that is given back keeps them when it is read and
@@ -745,5 +749,6 @@ pub(crate) fn outcome(
         yielding: yielded.map(|yielded| YieldedWork::of(yielded, &finishing)),
         compensation: corrected.map(|corrected| CompensatedProgram::of(corrected, refed)),
         refeed: refed.map(RefedProgram::of),
+        conformance: None,
     }
 }

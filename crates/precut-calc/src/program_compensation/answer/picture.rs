@@ -3,13 +3,15 @@
 use std::borrow::Cow;
 
 use crate::calculator::{Axis, Column, Figure, Frame, Item, Message, Panel, Role, Table};
+use crate::certainty::picture as doubt;
+use crate::diameters::DOUBT_LABELS;
 
 use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
 use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, RefedFeeds, YieldedWork};
 
-pub(crate) const FIGURE_IDS: &[&str] = &["program"];
-pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes", "feeds"];
+pub(crate) const FIGURE_IDS: &[&str] = &["program", doubt::ID];
+pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes", "feeds", doubt::ID];
 
 /// Codes of titles, axes and legends.
 pub(crate) const LABEL_CODES: &[&str] = &[
@@ -67,7 +69,9 @@ pub(crate) fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
         x: Axis::linear("program_z", "mm"),
         panels,
     };
-    if program.panels.is_empty() { Vec::new() } else { vec![program] }
+    let sure = outcome.conformance.as_ref();
+    let doubted = sure.and_then(|sure| doubt::figure(&sure.contributions, &sure.joint, DOUBT_LABELS));
+    Some(program).filter(|program| !program.panels.is_empty()).into_iter().chain(doubted).collect()
 }
 
 /// Ways of the tool.
@@ -280,6 +284,7 @@ pub(crate) fn tables(outcome: &Outcome) -> Vec<Table> {
             ],
         });
     }
+    found.extend(outcome.conformance.as_ref().map(|sure| doubt::table(&sure.contributions)));
     found
 }
 

@@ -1,5 +1,6 @@
 //! The corrected program as a file, with what it says of itself where that is asked for (`program/6`).
 
+use std::fmt::Write as _;
 use std::ops::Range;
 
 use crate::calculator::ReturnedProgram;
@@ -10,15 +11,19 @@ use super::super::model::reader::lines_of_text;
 use super::output::{CompensatedProgram, LineChange};
 
 /// Most characters of the comment.
-const LONGEST: usize = 160;
+const LONGEST: usize = 220;
 
-/// The program and its diff; `made_by` names the answer in its stamp.
-pub(crate) fn returned(job: &Job, compensation: &CompensatedProgram, made_by: &str) -> ReturnedProgram {
+/// The program and its diff; `made_by` names the answer in its stamp, and `kept` is how probably its limits are kept.
+pub(crate) fn returned(
+    job: &Job,
+    compensation: &CompensatedProgram,
+    (made_by, kept): (&str, Option<f64>),
+) -> ReturnedProgram {
     let (mut text, mut diff) = (compensation.nc_program.clone(), compensation.diff.clone());
     // What comes back as it was has nothing to say.
     if job.mode.stamp && !compensation.changes.is_empty() {
         let does = if job.mode.kind.refeeds() { "changes feeds and shifts X" } else { "shifts X" };
-        let stamp = stamp(job.dialect, &compensation.changes, (made_by, does));
+        let stamp = stamp(job.dialect, &compensation.changes, (made_by, does, kept));
         let (line, end) = head(&job.nc_program, job.dialect);
         text = stamped(&text, line, end, &stamp);
         diff = unified(&job.nc_program, &with_stamp(&job.nc_program, &compensation.changes, line, &stamp));
@@ -27,10 +32,13 @@ pub(crate) fn returned(job: &Job, compensation: &CompensatedProgram, made_by: &s
 }
 
 /// The comment.
-fn stamp(dialect: Dialect, changes: &[LineChange], (made_by, does): (&str, &str)) -> String {
+fn stamp(dialect: Dialect, changes: &[LineChange], (made_by, does, kept): (&str, &str, Option<f64>)) -> String {
     let largest = |change: &LineChange| change.smallest_shift_um.abs().max(change.largest_shift_um.abs());
     let shift_um = changes.iter().map(largest).fold(0.0, f64::max);
-    let said = format!("{made_by} {does} by up to {shift_um:.0} um in {} lines", changes.len());
+    let mut said = format!("{made_by} {does} by up to {shift_um:.0} um in {} lines", changes.len());
+    if let Some(kept) = kept {
+        let _ = write!(said, ", within all limits with probability {kept:.3}");
+    }
     // Nothing in a comment acts, whatever names the answer.
     let plain = said.chars().map(|c| if c.is_ascii_alphanumeric() || " .,:-_".contains(c) { c } else { ' ' });
     let plain: String = plain.take(LONGEST).collect();
@@ -118,7 +126,7 @@ mod tests {
     #[test]
     fn nothing_in_the_comment_acts() {
         assert_eq!(
-            stamp(Dialect::Fanuc, &[], ("a) G0 (b;\n%", "shifts X")),
+            stamp(Dialect::Fanuc, &[], ("a) G0 (b;\n%", "shifts X", None)),
             "(a  G0  b    shifts X by up to 0 um in 0 lines)"
         );
     }

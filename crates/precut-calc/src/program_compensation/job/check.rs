@@ -1,6 +1,7 @@
 //! Rules between fields. What is wrong in the program itself is told by its reader.
 
 use crate::calculator::{Check, Finding, Violations};
+use crate::diameters::{self, Uncertainty};
 use crate::machinability::ModelForm;
 use crate::material;
 
@@ -30,6 +31,8 @@ pub(crate) const CODES: &[&str] = &[
     "unknown_material",
     "elastic_constants_missing",
     "bad_bore",
+    "tolerance_without_force",
+    "uncertainty_without_tolerance",
 ];
 
 /// Tip directions of turning from outside.
@@ -43,6 +46,7 @@ impl Check for Job {
         self.check_tools(violations);
         self.check_holding(violations);
         self.check_refeed(violations);
+        self.check_certainty(violations);
         for (i, keep_out) in self.keep_out.iter().enumerate() {
             violations.require(keep_out.z_start_mm < keep_out.z_end_mm, || {
                 Finding::new("keep_out_without_length", format!("/keep_out/{i}/z_end_mm"))
@@ -127,6 +131,16 @@ impl Job {
         if let Some(holding) = self.holding() {
             holding.check(violations);
         }
+    }
+
+    /// What limits of the diameter ask for.
+    fn check_certainty(&self, violations: &mut Violations) {
+        diameters::check(&self.asked(), violations);
+        let is_limited = !self.tolerance.is_none();
+        violations.require(!is_limited || self.force.is_some(), || Finding::new("tolerance_without_force", "/force"));
+        violations.require(is_limited || self.uncertainty == Uncertainty::default(), || {
+            Finding::new("uncertainty_without_tolerance", "/tolerance")
+        });
     }
 
     /// What new feeds ask for.

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{Dialect, ProgramEncoding};
 use crate::deflection_compensation::{Carriage, Gravity, Holding, Segment, Shaft, Support, Theory};
+use crate::diameters::{Asked, Draw, Tolerance, Uncertainty};
 use crate::effects::{DeflectionConditions, DeflectionEffect};
 use crate::force::ForceModel;
 use crate::machinability::MachinabilityModel;
@@ -39,6 +40,15 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 1000, extensions(("x-group" = json!("workpiece")), ("x-advanced" = json!(true))))]
     pub drawing: Vec<StockRow>,
+    /// What the drawing allows, on the diameter, all along the contour that the program makes. With it, and with `force`, the answer says
+    /// how probable it is that a part keeps it.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("limits"))))]
+    pub tolerance: Tolerance,
+    /// How sure what goes in is; of use with `tolerance`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub uncertainty: Uncertainty,
     /// The tools that cut. Needed with `stock`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 100, extensions(("x-group" = json!("cut"))))]
@@ -95,6 +105,12 @@ impl Job {
         })
     }
 
+    /// What it asks of the diameters that it makes.
+    pub(crate) fn asked(&self) -> Asked<'_> {
+        let Self { tolerance, uncertainty, effects, .. } = self;
+        Asked { tolerance, uncertainty, effects, open_aim_um: None }
+    }
+
     /// What holds the blank and what pushes it, where the job says by which forces.
     pub(crate) fn holding(&self) -> Option<Holding> {
         let (stock, force) = self.stock.as_ref().zip(self.force.as_ref())?;
@@ -109,6 +125,7 @@ impl Job {
             gravity: self.gravity.clone(),
             effects: self.effects.clone(),
             conditions: self.conditions.clone(),
+            draw: Draw::STATED,
         })
     }
 

@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::calculator::{Failure, Monitor};
 use crate::deflection_compensation::Holding;
 
-use super::super::job::{Job, ProgramStock};
+use super::super::job::{Job, ProgramStock, SupportLines};
 use super::reader::Program;
 use super::stock::{Part, Stroke, Turned, lines_that_finish, strokes};
 use super::yielding::{Driven, Instead, Yielded, yielding};
@@ -49,6 +49,8 @@ pub(crate) struct Corrected {
     pub(crate) changed: Vec<ChangedLine>,
     /// Finishing lines that stay as they are, and why.
     pub(crate) left_alone: Vec<LeftAlone>,
+    /// Lines of the new text in which supports act.
+    pub(crate) support_lines: Vec<SupportLines>,
     /// A unified diff; empty where nothing changes.
     pub(crate) diff: String,
     /// Lines whose surface comes out too small whatever their shift.
@@ -120,6 +122,7 @@ pub(crate) fn corrected(
         return Ok(Corrected {
             text,
             changed: Vec::new(),
+            support_lines: job.support_lines.clone(),
             left_alone,
             diff: String::new(),
             undersize: Vec::new(),
@@ -128,8 +131,9 @@ pub(crate) fn corrected(
     };
     let diff = unified(&job.nc_program, &written.changed);
     let undersize = undersize(&before.nominal, &planned.real, &lines);
+    let support_lines = proof::moved_supports(job, &written);
     let Written { text, changed, .. } = written;
-    Ok(Corrected { text, changed, left_alone, diff, undersize, proof: Some(proof) })
+    Ok(Corrected { text, changed, support_lines, left_alone, diff, undersize, proof: Some(proof) })
 }
 
 /// The finishing moves as they should come out, on work that bends as the corrected program by itself leaves it: the shifts

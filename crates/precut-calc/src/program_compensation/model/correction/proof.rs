@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::calculator::{Failure, Finding, Monitor};
 use crate::deflection_compensation::Holding;
 
-use super::super::super::job::{Job, ProgramStock};
+use super::super::super::job::{Job, ProgramStock, SupportLines};
 use super::super::reader::{self, Feed, Program, ProgramMove, Speed};
 use super::super::stock::{Part, Turned, lines_that_finish, turned};
 use super::super::yielding::{ContourError, Driven, Yielded, contour, yielding};
@@ -115,12 +115,7 @@ pub(crate) fn proved(
     let Task { program, job, holding, blank, .. } = *task;
     let mut again = job.clone();
     again.nc_program.clone_from(&written.text);
-    for lines in &mut again.support_lines {
-        let moved = |line: u32| u32::try_from(written.line(line as usize)).unwrap_or(line);
-        // The first piece of a line stands where the line stood.
-        lines.from_line = lines.from_line.map(|from| moved(from.saturating_sub(1)) + 1);
-        lines.to_line = lines.to_line.map(moved);
-    }
+    again.support_lines = moved_supports(job, written);
     let read = reader::read(&written.text, again.dialect, &again.reading, monitor)?;
     let moves_compared = compare(program, &read, written)?;
     let driven_rigid = turned(&read, &again, blank, monitor)?;
@@ -173,6 +168,18 @@ pub(crate) fn proved(
         moves_compared,
         contour: errors,
     })
+}
+
+/// The lines of the new text in which supports act.
+pub(crate) fn moved_supports(job: &Job, written: &Written) -> Vec<SupportLines> {
+    let moved = |line: u32| u32::try_from(written.line(line as usize)).unwrap_or(line);
+    // The first piece of a line stands where the line stood.
+    let of = |lines: &SupportLines| SupportLines {
+        from_line: lines.from_line.map(|from| moved(from.saturating_sub(1)) + 1),
+        to_line: lines.to_line.map(moved),
+        ..*lines
+    };
+    job.support_lines.iter().map(of).collect()
 }
 
 /// No rapid move comes nearer to the work than before, but for those that keep well off.

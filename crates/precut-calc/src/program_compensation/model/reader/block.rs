@@ -85,6 +85,14 @@ struct Asked<'a> {
     takes_tool: bool,
 }
 
+impl Asked<'_> {
+    /// Whether a cycle over a contour is asked for, whose words are its own.
+    fn is_over_contour(&self) -> bool {
+        let once = self.once.map(|(once, _)| once);
+        matches!(once, Some(Once::RoughAlong | Once::RoughAcross | Once::Finish))
+    }
+}
+
 impl<'a> Reader<'a> {
     /// Runs a block; gives the line that comes next where that is not the next one.
     pub(super) fn execute(&mut self, block: &Block<'a>) -> Result<Option<usize>, Failure> {
@@ -99,7 +107,7 @@ impl<'a> Reader<'a> {
         self.codes(&mut words, &mut asked);
         self.names(&mut words, &mut asked);
         self.functions(&mut words, &mut asked);
-        self.tool(&mut words, asked.takes_tool);
+        self.tool(&mut words, &asked);
         if self.notes.count() > before {
             self.is_doubtful = true;
             return Ok(None);
@@ -314,7 +322,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn tool(&mut self, words: &mut Words<'_, 'a>, takes_tool: bool) {
+    fn tool(&mut self, words: &mut Words<'_, 'a>, asked: &Asked<'a>) {
         if let Some(word) = words.take(b'T') {
             let called = self.tool_of(word);
             match self.dialect {
@@ -322,13 +330,13 @@ impl<'a> Reader<'a> {
                 _ => self.state.tool = called.or(self.state.tool),
             }
         }
-        if takes_tool {
+        if asked.takes_tool {
             self.state.tool = self.state.next_tool.or(self.state.tool);
         }
         if self.dialect == Dialect::Siemens || self.dialect == Dialect::LinuxCnc {
             // Offsets: D of Siemens, and D of LinuxCNC where it is no limit of the speed.
             let is_limit = self.dialect == Dialect::LinuxCnc && self.state.is_surface;
-            if !is_limit {
+            if !is_limit && !asked.is_over_contour() {
                 words.take_all("D");
             }
         }
@@ -372,6 +380,7 @@ impl<'a> Reader<'a> {
         }
         if self.dialect == Dialect::LinuxCnc
             && self.state.is_surface
+            && !asked.is_over_contour()
             && let Some(word) = words.take(b'D')
         {
             self.state.limit_rpm = Some(word.number());

@@ -297,7 +297,11 @@ fn of_linuxcnc(tenths: u32) -> Option<Meaning> {
         430 => Meaning::Neutral("H"),
         580 | 590..=593 => Meaning::Zero(tenths),
         640 => Meaning::Neutral("PQ"),
-        700 | 710..=722 => Meaning::Refused("cycle_not_read"),
+        700 => Meaning::Finish,
+        710 | 711 => Meaning::RoughAlong,
+        720 | 721 => Meaning::RoughAcross,
+        // Pockets alone.
+        712..=719 | 722 => Meaning::Refused("cycle_not_read"),
         760 => Meaning::ThreadRepeated,
         800 => Meaning::NoMotion,
         900 => Meaning::Absolute,

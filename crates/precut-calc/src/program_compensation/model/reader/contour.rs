@@ -1,6 +1,6 @@
 //! Cycles over a contour, roughing and finishing: what their words say, and the contour that they name (`program/2.4`).
 
-use crate::calculator::Failure;
+use crate::calculator::{Dialect, Failure};
 
 use super::block::Words;
 use super::codes::Path;
@@ -31,6 +31,17 @@ pub(super) struct Lines {
     to: usize,
 }
 
+impl Lines {
+    pub(super) fn of(from: usize, to: usize) -> Self {
+        Self { from, to }
+    }
+
+    /// As they are told, from 1.
+    pub(super) fn told(self) -> (usize, usize) {
+        (self.from + 1, self.to + 1)
+    }
+}
+
 impl<'a> Reader<'a> {
     /// A roughing cycle: the first of its two lines, or the one with the contour. Gives the line that comes next.
     pub(super) fn rough(
@@ -39,6 +50,9 @@ impl<'a> Reader<'a> {
         spot: Spot<'a>,
         by: Use,
     ) -> Result<Option<usize>, Failure> {
+        if self.dialect == Dialect::LinuxCnc {
+            return self.rough_sub(words, spot, by).map(|()| None);
+        }
         if self.refuse_nested(words, spot) {
             return Ok(None);
         }
@@ -111,6 +125,9 @@ impl<'a> Reader<'a> {
 
     /// A finishing cycle. Gives the line that comes next.
     pub(super) fn finish(&mut self, words: &mut Words<'_, 'a>, spot: Spot<'a>) -> Result<Option<usize>, Failure> {
+        if self.dialect == Dialect::LinuxCnc {
+            return self.finish_sub(words, spot).map(|()| None);
+        }
         if self.refuse_nested(words, spot) {
             return Ok(None);
         }
@@ -141,7 +158,7 @@ impl<'a> Reader<'a> {
         Ok(None)
     }
 
-    fn refuse_nested(&mut self, words: &mut Words<'_, 'a>, spot: Spot<'a>) -> bool {
+    pub(super) fn refuse_nested(&mut self, words: &mut Words<'_, 'a>, spot: Spot<'a>) -> bool {
         if self.contour.is_some() {
             self.notes.fault(spot, "cycle_in_contour");
             words.take_rest();
@@ -187,7 +204,12 @@ impl<'a> Reader<'a> {
     }
 
     /// The contour that roughing goes to, without the way to it and without rapid moves behind it, and how its passes lie.
-    fn contour_of(&mut self, lines: Lines, by: Use, spot: Spot<'a>) -> Result<Option<(Vec<Element>, Sight)>, Failure> {
+    pub(super) fn contour_of(
+        &mut self,
+        lines: Lines,
+        by: Use,
+        spot: Spot<'a>,
+    ) -> Result<Option<(Vec<Element>, Sight)>, Failure> {
         let before = self.notes.count();
         let (state, moves) = (self.kept(), std::mem::take(&mut self.moves));
         let start = state.place;
@@ -198,7 +220,9 @@ impl<'a> Reader<'a> {
         if self.notes.count() > before {
             return Ok(None);
         }
-        let cut = along.iter().rposition(|one| one.kind.is_feed()).map_or(0, |last| last + 1);
+        // To LinuxCNC rapid moves are parts of the contour like any others.
+        let last_cut = along.iter().rposition(|one| one.kind.is_feed()).map_or(0, |last| last + 1);
+        let cut = if self.dialect == Dialect::LinuxCnc { along.len() } else { last_cut };
         let elements = elements(start, &along[..cut]);
         let Some((approach, contour)) = elements.split_first().filter(|(_, rest)| !rest.is_empty()) else {
             self.notes.fault(spot, "contour_not_found");

@@ -1,7 +1,7 @@
 //! From the text of a program to its moves (`program/2`).
 //!
 //! `lines` -> `lexer` (words with their places) -> `block` (modal state, one block after another) -> `moves`; `codes` has what
-//! each control means by its words, `cycles`, `contour` and `passes` expand what stands for many moves, `arcs` finds centres. Nothing is
+//! each control means by its words, `cycles`, `contour`, `subs` and `passes` expand what stands for many moves, `arcs` finds centres. Nothing is
 //! guessed: what is not understood is a fault with its place, or, where it leaves the position known, passed with a warning.
 
 mod arcs;
@@ -16,6 +16,7 @@ mod lines;
 mod moves;
 mod passes;
 mod state;
+mod subs;
 mod words_of_line;
 
 use std::collections::BTreeMap;
@@ -148,10 +149,12 @@ pub(crate) fn read(text: &str, dialect: Dialect, reading: &Reading, monitor: &dy
     if notes.count() > 0 {
         return Err(refused(notes));
     }
+    let extent = Extent::of(text, &lines, dialect);
     let mut reader = Reader {
         text,
         lines: &lines,
-        extent: Extent::of(text, &lines, dialect),
+        subs: subs::called(text, &lines, &extent, dialect),
+        extent,
         dialect,
         reading,
         notes,
@@ -224,6 +227,8 @@ struct Reader<'a> {
     contour: Option<contour::Use>,
     /// Contours that were asked for, by the numbers of their blocks.
     contours: Vec<([Option<u64>; 2], contour::Lines)>,
+    /// Subprograms that are the contour of a cycle.
+    subs: Vec<subs::Sub>,
     /// Blocks that were run, contours each time.
     blocks: usize,
     /// Whether the program has ended.
@@ -251,7 +256,12 @@ impl<'a> Reader<'a> {
                 self.after_end(at);
                 break;
             }
-            at = self.step(at)?.max(at + 1);
+            // A contour is run by its cycles.
+            let sub = self.subs.iter().find(|sub| sub.from == at).map(|sub| sub.to + 1);
+            at = match sub {
+                Some(behind) => behind,
+                None => self.step(at)?.max(at + 1),
+            };
         }
         Ok(())
     }

@@ -25,7 +25,7 @@ impl Element {
         self.with(|point| [point[0] + r, point[1] + z])
     }
 
-    fn with(self, to: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub(super) fn with(self, to: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let arc = self.arc.map(|(centre, path)| (to(centre), path));
         Self { start: to(self.start), end: to(self.end), arc, line: self.line }
     }
@@ -69,7 +69,7 @@ impl Sight {
     }
 
     /// The place with these coordinates.
-    fn place(self, [first, second]: [f64; 2]) -> Place {
+    pub(super) fn place(self, [first, second]: [f64; 2]) -> Place {
         match self {
             Self::Along => Place::at(2.0 * first, second),
             Self::Across { sign } => Place::at(2.0 * second, sign * first),
@@ -94,6 +94,22 @@ impl Sight {
     }
 }
 
+/// How far passes at levels that fall reach along a contour that is seen so: to the first part that is as high as they.
+pub(super) fn hits(levels: &[f64], seen: &[Element]) -> Vec<f64> {
+    let Some(last) = seen.last() else { return Vec::new() };
+    let mut part = 0;
+    let mut hits: Vec<f64> = Vec::with_capacity(levels.len());
+    for &level in levels.iter().rev() {
+        while part + 1 < seen.len() && seen[part].end[0] < level {
+            part += 1;
+        }
+        let one = &seen[part];
+        hits.push(if one.end[0] < level { last.end[1] } else { one.second_at(level) });
+    }
+    hits.reverse();
+    hits
+}
+
 impl<'a> Reader<'a> {
     /// Passes down to the contour, then one along it; all of it leaves the allowances.
     pub(super) fn passes(&mut self, contour: &[Element], sight: Sight, spot: Spot<'a>, allowance: [f64; 2]) {
@@ -112,28 +128,13 @@ impl<'a> Reader<'a> {
         };
         let ([start, begin], direction) = (sight.of([0.5 * x0, z0]), sight.direction(&contour));
         let retract = self.state.rough_retract;
-        let count = ((start - first.start[0] - SAME_MM) / depth).ceil() - 1.0;
-        if count > MAX_PASSES as f64 {
-            self.notes.fault_with(spot, "too_many_moves", |finding| finding.with("limit_moves", 4 * MAX_PASSES));
+        let Some(levels) = self.levels(start, first.start[0], depth, spot) else {
             return;
-        }
+        };
+        let levels = &levels[1..];
         // Controls rough without compensation of the nose.
         let nose = std::mem::replace(&mut self.state.nose, Nose::Off);
-        // A pass reaches the first part that is as high as it.
-        let mut part = 0;
-        let mut hits = Vec::new();
-        // Below MAX_PASSES.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let count = count.max(0.0) as usize;
-        let levels: Vec<f64> = (1..=count).map(|i| start - depth * i as f64).collect();
-        for &level in levels.iter().rev() {
-            while part + 1 < seen.len() && seen[part].end[0] < level {
-                part += 1;
-            }
-            let one = &seen[part];
-            hits.push(if one.end[0] < level { last.end[1] } else { one.second_at(level) });
-        }
-        for (&level, &hit) in levels.iter().zip(hits.iter().rev()) {
+        for (&level, hit) in levels.iter().zip(hits(levels, &seen)) {
             // What begins behind the start finds nothing to cut.
             if (hit - begin) * direction <= 0.0 {
                 continue;
@@ -149,6 +150,19 @@ impl<'a> Reader<'a> {
         self.go(line, Kind::Rapid, sight.place([start, last.end[1]]), None);
         self.go(line, Kind::Rapid, Place::at(x0, z0), None);
         self.state.nose = nose;
+    }
+
+    /// Levels of passes down to a contour, the one at which they begin first; a fault where there are too many.
+    pub(super) fn levels(&mut self, start: f64, to: f64, depth: f64, spot: Spot<'a>) -> Option<Vec<f64>> {
+        let count = ((start - to - SAME_MM) / depth).ceil() - 1.0;
+        if count > MAX_PASSES as f64 {
+            self.notes.fault_with(spot, "too_many_moves", |finding| finding.with("limit_moves", 4 * MAX_PASSES));
+            return None;
+        }
+        // Below MAX_PASSES.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let count = count.max(0.0) as usize;
+        Some((0..=count).map(|i| start - depth * i as f64).collect())
     }
 
     /// Passes along the contour, each nearer to it; the last one leaves the allowances.
@@ -190,7 +204,14 @@ impl<'a> Reader<'a> {
         if let Some(first) = contour.first() {
             self.go(line, Kind::Line, point(first.start), None);
         }
+        self.along(Some(line), contour);
+    }
+
+    /// Along a contour, in one line or in its own ones.
+    pub(super) fn along(&mut self, line: Option<usize>, contour: &[Element]) {
+        let point = |[r, z]: [f64; 2]| Place::at(2.0 * r, z);
         for one in contour {
+            let line = line.unwrap_or(one.line);
             match one.arc {
                 None => self.go(line, Kind::Line, point(one.end), None),
                 Some((centre, path)) => {

@@ -70,12 +70,13 @@ pub(crate) struct Refed {
 
 impl Refed {
     /// The program that is given back where nothing else changes.
-    pub(crate) fn alone(&self, given: &str) -> Corrected {
+    pub(crate) fn alone(&self, job: &Job) -> Corrected {
         Corrected {
             text: self.text.clone(),
             changed: self.changed.clone(),
             left_alone: Vec::new(),
-            diff: unified(given, &self.changed),
+            support_lines: job.support_lines.clone(),
+            diff: unified(&job.nc_program, &self.changed),
             undersize: Vec::new(),
             proof: None,
         }

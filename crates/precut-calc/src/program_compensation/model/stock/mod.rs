@@ -12,6 +12,7 @@ mod sweep;
 
 pub(crate) use chain::{Chain, Part, Sums};
 pub(crate) use curve::{Curve, Piece, SAME_MM};
+pub(crate) use nose::path_beside;
 pub(crate) use rigid::{
     Doubt, FAILURE_CODES, FINISHES_MM, Stroke, Turned, blank, doubt, implausible_mm, lines_that_finish, outline,
     strokes, turned, zero_that_fits,

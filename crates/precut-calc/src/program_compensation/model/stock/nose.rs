@@ -157,6 +157,35 @@ pub(super) fn ways(moves: &[Option<Programmed>]) -> Result<Vec<Option<Compensate
     Ok(found)
 }
 
+/// A path at a distance to the side of another one: round the corners of which it is on the outside, and at others as far as both
+/// parts of it meet. `None` where the other one is narrower than that.
+pub(crate) fn path_beside(path: &[Way], nose: Nose, by_mm: f64) -> Option<Vec<Way>> {
+    let beside = |way: Way| Programmed { way, nose, radius: by_mm, centre: [0.0; 2], tool: None };
+    let path: Vec<Programmed> = path.iter().copied().filter(|way| way.length_mm() > SAME_MM).map(beside).collect();
+    // It comes beside the path from anywhere.
+    let [begin, _] = path.first()?.way.ends();
+    let approach = beside(Way::Line(add(begin, [1.0, 1.0], by_mm), begin));
+    let moves: Vec<Option<Programmed>> = std::iter::once(approach).chain(path.iter().copied()).map(Some).collect();
+    let found = ways(&moves).ok()?;
+    let mut all: Vec<Way> = Vec::new();
+    for (i, one) in found.into_iter().skip(1).enumerate() {
+        let way = one?.way;
+        if let (Some(last), Some(before)) = (all.last(), i.checked_sub(1)) {
+            let ([_, from], [to, _]) = (last.ends(), way.ends());
+            let [_, corner] = path[before].way.ends();
+            let [first, second] = [from, to].map(|end| (end[1] - corner[1]).atan2(end[0] - corner[0]));
+            if dot(add(to, from, -1.0), add(to, from, -1.0)).sqrt() > SAME_MM {
+                // Less than half a turn.
+                let turn =
+                    (second - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+                all.push(Way::Arc { centre: corner, radius: by_mm, from: first, turn });
+            }
+        }
+        all.push(way);
+    }
+    Some(all)
+}
+
 /// The way of the programmed point that goes with one of the centre of the nose.
 fn moved(way: Way, centre: Point) -> Way {
     match way {

@@ -74,6 +74,15 @@ impl Way {
         (to[0] - from[0]).abs() >= (to[1] - from[1]).abs()
     }
 
+    /// The same way farther off the axis.
+    pub(crate) fn set_out(self, by_mm: f64) -> Self {
+        let out = |[x, r]: [f64; 2]| [x, r + by_mm];
+        match self {
+            Self::Line(from, to) => Self::Line(out(from), out(to)),
+            Self::Arc { centre, radius, from, turn } => Self::Arc { centre: out(centre), radius, from, turn },
+        }
+    }
+
     /// The way between two of its places, each lifted off the axis: an arc stays an arc of its radius.
     pub(crate) fn lifted(&self, [from, to]: [f64; 2], lifts_mm: [f64; 2]) -> Self {
         let lift = |share: f64, by: f64| {

@@ -38,7 +38,7 @@ impl Aim {
             return None;
         }
         let nominal = nominal();
-        let meant = meant(&drawn, &nominal);
+        let meant = against(&drawn, &nominal);
         let mut made: BTreeMap<usize, Vec<[f64; 2]>> = BTreeMap::new();
         for part in &nominal {
             if let Some(line) = part.owner {
@@ -109,7 +109,7 @@ impl Aim {
 }
 
 /// What a program leaves, with the drawing in its place where it comes near to that.
-fn meant(drawn: &[Part], nominal: &[Part]) -> Vec<Part> {
+pub(crate) fn against(drawn: &[Part], nominal: &[Part]) -> Vec<Part> {
     let mut meant = Vec::with_capacity(nominal.len());
     for part in nominal {
         let Piece { x0, x1, curve } = part.piece;

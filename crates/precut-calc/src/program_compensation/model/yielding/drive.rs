@@ -62,15 +62,22 @@ pub(crate) struct Driven<'a> {
     pub(crate) goes_on: Option<&'a Yielded>,
     /// A drive of the same moves at whose places they are looked at: what comes of a small change is then as smooth as the model.
     pub(crate) places_of: Option<&'a Yielded>,
+    /// By how much the tool stands farther out than it is programmed, on lines that make the contour and on all others, mm.
+    pub(crate) set_out_mm: [f64; 2],
 }
 
 /// No move.
 static NO_MOVES: BTreeSet<usize> = BTreeSet::new();
 
 impl<'a> Driven<'a> {
+    /// By how much the tool stands out on a line, mm.
+    fn set_out_mm(&self, line: usize) -> f64 {
+        self.set_out_mm[usize::from(self.finishing.binary_search(&line).is_err())]
+    }
+
     /// As moves are, with the lines that make the contour.
     pub(crate) fn as_it_is(finishing: &'a [usize]) -> Self {
-        Self { finishing, corrected: &NO_MOVES, bends_as: None, goes_on: None, places_of: None }
+        Self { finishing, corrected: &NO_MOVES, bends_as: None, goes_on: None, places_of: None, set_out_mm: [0.0; 2] }
     }
 }
 
@@ -185,7 +192,10 @@ pub(crate) fn yielding(
     let mut kept_at = is_whole.then(|| begins_at(program, driven.finishing));
     let aim = Aim::of(job, || rigid(program, job, (stock, zero)));
     let mut pace = calculator::Pace::new(monitor);
-    for stroke in strokes(program, job, zero).filter(|stroke| stroke.index >= from) {
+    for mut stroke in strokes(program, job, zero).filter(|stroke| stroke.index >= from) {
+        if stroke.one.kind.is_feed() {
+            stroke.way = stroke.way.set_out(driven.set_out_mm(stroke.one.line));
+        }
         if kept_at.take_if(|at| stroke.index >= *at).is_some() {
             yielded.start = Some(Box::new(yielded.start_at(stroke.index, state.clone())));
         }

@@ -14,7 +14,7 @@ mod near;
 mod outline;
 mod sections;
 
-pub(crate) use aim::FARTHEST_MM;
+pub(crate) use aim::{FARTHEST_MM, against};
 pub(crate) use contour::{ContourError, between, contour, radius_at};
 pub(crate) use cut::{AXIS_MM, CutPlace, Load, Pace};
 pub(crate) use drive::{CLOSE_MM, CutMove, Driven, FAILURE_CODES, Instead, PlaceOfMove, Yielded, yielding};

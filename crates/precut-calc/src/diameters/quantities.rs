@@ -10,8 +10,8 @@ use crate::certainty::{
 };
 use crate::effects::DeflectionEffect;
 
-use super::input::{Job, Uncertainty};
-use super::rehearsal::Draw;
+use super::limits::{Tolerance, Uncertainty};
+use super::{Asked, Draw};
 
 const UM_PER_MM: f64 = 1e3;
 /// Standard uncertainty of the diameter that a tool is set to, where nobody states it, um.
@@ -20,7 +20,22 @@ const TOOL_SETTING_UM: f64 = 2.0;
 const LARGEST_NORMAL_PERCENT: f64 = 25.0;
 
 /// Codes of the faults found here.
-pub(super) const CODES: &[&str] = &["tolerance_given_twice", "limits_crossed"];
+pub(crate) const CODES: &[&str] = &["tolerance_given_twice", "limits_crossed"];
+
+/// Codes of what may be doubted, in the picture of the doubt.
+pub(crate) const DOUBT_LABELS: &[&str] = &[
+    "doubt_force",
+    "doubt_stiffness",
+    "doubt_youngs_modulus",
+    "doubt_headstock_compliance",
+    "doubt_tailstock_compliance",
+    "doubt_rest_compliance",
+    "doubt_carriage_compliance",
+    "doubt_rest_gap",
+    "doubt_tool_setting",
+    "doubt_stock_diameter",
+    "doubt_spindle_scatter",
+];
 
 /// A quantity that is not known exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -141,8 +156,8 @@ pub struct DeflectionCorrelation {
 }
 
 /// All quantities of a checked job that are uncertain, and how they go together.
-pub(super) fn uncertainties(job: &Job) -> Result<Uncertainties<DeflectionQuantity>, Contradiction> {
-    let stated = &job.uncertainty;
+pub(super) fn uncertainties(asked: &Asked<'_>) -> Result<Uncertainties<DeflectionQuantity>, Contradiction> {
+    let stated = asked.uncertainty;
     let mut of: Vec<Uncertain<DeflectionQuantity>> = stated
         .quantities
         .iter()
@@ -153,7 +168,7 @@ pub(super) fn uncertainties(job: &Job) -> Result<Uncertainties<DeflectionQuantit
             source: Source::Stated,
         })
         .collect();
-    for usual in usual(job) {
+    for usual in usual(asked) {
         let is_stated = of.iter().any(|one| {
             one.quantity == usual.quantity
                 || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
@@ -180,7 +195,7 @@ pub(super) fn draw_of(of: &Uncertainties<DeflectionQuantity>, values: &[f64]) ->
 
 impl Uncertainty {
     /// Relative standard uncertainty of force and of stiffness: as a quantity states it, else in percent.
-    pub(super) fn of_force_and_stiffness(&self) -> [f64; 2] {
+    pub(crate) fn of_force_and_stiffness(&self) -> [f64; 2] {
         let of = |quantity, percent: f64| {
             let stated = self.quantities.iter().find(|one| one.quantity == quantity);
             stated.map_or(percent / 100.0, |one| one.distribution.relative())
@@ -190,8 +205,8 @@ impl Uncertainty {
 }
 
 /// What is uncertain in every job, as far as it is not stated otherwise.
-fn usual(job: &Job) -> Vec<Uncertain<DeflectionQuantity>> {
-    let Uncertainty { force_percent, stiffness_percent, .. } = job.uncertainty;
+fn usual(asked: &Asked<'_>) -> Vec<Uncertain<DeflectionQuantity>> {
+    let Uncertainty { force_percent, stiffness_percent, .. } = *asked.uncertainty;
     let usual = Uncertainty::default();
     let source = |percent: f64, usual: f64| {
         if percent.to_bits() == usual.to_bits() { Source::Default } else { Source::Stated }
@@ -220,7 +235,7 @@ fn usual(job: &Job) -> Vec<Uncertain<DeflectionQuantity>> {
             source: Source::Default,
         },
     ];
-    all.extend(job.effects.iter().filter_map(|effect| match *effect {
+    all.extend(asked.effects.iter().filter_map(|effect| match *effect {
         DeflectionEffect::SpindleScatter { sd_um } => Some(Uncertain {
             quantity: DeflectionQuantity::SpindleScatter,
             // Of the radius.
@@ -234,16 +249,15 @@ fn usual(job: &Job) -> Vec<Uncertain<DeflectionQuantity>> {
 }
 
 /// Finds what cannot be in the uncertainty and in the limits of size.
-pub(super) fn check(job: &Job, violations: &mut Violations) {
-    check_limits(job, violations);
-    let stated = &job.uncertainty;
+pub(crate) fn check(asked: &Asked<'_>, violations: &mut Violations) {
+    check_limits(asked.tolerance, violations);
+    let stated = asked.uncertainty;
     let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
     check_quantities(&quantities, violations);
-    check_correlations(&pairs(stated), || uncertainties(job).err(), violations);
+    check_correlations(&pairs(stated), || uncertainties(asked).err(), violations);
 }
 
-fn check_limits(job: &Job, violations: &mut Violations) {
-    let tolerance = &job.tolerance;
+fn check_limits(tolerance: &Tolerance, violations: &mut Violations) {
     let limits = [tolerance.diameter_upper_um, tolerance.diameter_lower_um];
     violations.require(tolerance.diameter_um.is_none() || limits.iter().all(Option::is_none), || {
         Finding::new("tolerance_given_twice", "/tolerance/diameter_um")

@@ -4,7 +4,7 @@ use crate::calculator::{Failure, Finding, Message};
 use crate::certainty::lines::{Margins, Question, Together};
 use crate::certainty::{Acceptance, bounded};
 
-use super::conformance::{By, Judged};
+use super::judged::{By, Judged};
 
 /// Standard uncertainties by which acceptance limits lie within those of size: then a part that is just out of them is accepted
 /// with 5 % (ISO 14253-1:2017).
@@ -18,16 +18,11 @@ const BOTH: usize = 2;
 /// Most lines of one scrambling.
 const MOST_LINES: usize = 128;
 
-/// Codes of what is said here.
-pub(super) const EXPLANATION_CODES: &[&str] = &["accept_between"];
-/// Codes of the warnings made here.
-pub(super) const WARNING_CODES: &[&str] = &["gauge_too_uncertain"];
-
 impl Judged<'_> {
     /// Limits of acceptance for a gauge of that standard uncertainty; `None` without limits of size, and where none are left. Its error
     /// is the same for all readings of a part.
     pub(super) fn acceptance(&self, gauge_um: f64, shift_um: f64) -> Result<Option<Acceptance>, Failure> {
-        let limits = self.limits();
+        let limits = self.limits;
         let band_um = BAND * gauge_um;
         let (upper_um, lower_um) = (limits.upper_um.map(|um| um - band_um), limits.lower_um.map(|um| um + band_um));
         let is_left = upper_um.zip(lower_um).is_none_or(|(upper, lower)| upper > lower);
@@ -45,10 +40,10 @@ impl Judged<'_> {
             let (part, reading) = (within(limits.upper_um, limits.lower_um, ends), within(upper_um, lower_um, read));
             Ok([part[0], part[1], reading[0], reading[1]])
         };
-        let axis: Vec<f64> = self.axis().iter().copied().chain([0.0]).collect();
-        let question = Question { axis: &axis, sets: SETS, effort: self.effort(MOST_LINES), monitor: self.monitor() };
+        let axis: Vec<f64> = self.axis.iter().copied().chain([0.0]).collect();
+        let question = Question { axis: &axis, sets: SETS, effort: self.effort(MOST_LINES), monitor: self.monitor };
         let by = |by: By| move |scores: &[f64]| margins(by, scores);
-        let found = question.of_real(&mut by(By::Rehearsal), &mut by(By::Surface))?;
+        let found = self.really(&question, &mut by(By::Model), &mut by(By::Surface))?;
         let [good, accepted, both] = [GOOD, ACCEPTED, BOTH].map(|set| found.of[set].probability);
         Ok(Some(Acceptance {
             measuring_uncertainty_um: gauge_um,

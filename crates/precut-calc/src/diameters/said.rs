@@ -1,0 +1,66 @@
+//! What is said of the probability that diameters keep their limits.
+
+use crate::calculator::{Finding, Message};
+use crate::certainty::{Conformance, Improvement};
+
+use super::{Asked, acceptance};
+
+/// Codes of what is said here.
+pub(crate) const EXPLANATION_CODES: &[&str] = &["probably_good", "first_part_tells", "aim_tells", "accept_between"];
+/// Codes of the warnings made here.
+pub(crate) const WARNING_CODES: &[&str] = &["improbable", "gauge_too_uncertain"];
+
+/// What is said of it, most important first.
+pub(crate) fn said(conformance: &Conformance) -> Vec<Message> {
+    let joint = &conformance.joint;
+    let mut first = Message::new("probably_good")
+        .with("percent", 100.0 * joint.probability)
+        .with("wanted_percent", 100.0 * joint.wanted)
+        .with("met", if joint.met { "yes" } else { "no" })
+        .with("common_percent", 100.0 * conformance.setup.share_common_to_all);
+    // Where quantities go together none has a share of its own.
+    if let Some(largest) = conformance.contributions.iter().find(|one| one.share_of_variance.is_some()) {
+        first = first
+            .with("quantity", largest.quantity.clone())
+            .with("share_percent", 100.0 * largest.share_of_variance.unwrap_or(0.0));
+    }
+    let advised = conformance.advice.iter().map(|advice| match *advice {
+        Improvement::ShiftAim { shift_um, joint_probability, .. } => {
+            Message::new("aim_tells").with("shift_um", shift_um).with("percent", 100.0 * joint_probability)
+        }
+        Improvement::MeasureFirstPart {
+            z_mm,
+            expected_um,
+            shift_as_expected_um,
+            shift_um_per_um,
+            joint_probability,
+            ..
+        } => Message::new("first_part_tells")
+            .with("z_mm", z_mm)
+            .with("expected_um", expected_um)
+            .with("shift_um", shift_as_expected_um)
+            .with("shift_um_per_um", shift_um_per_um)
+            .with("percent", 100.0 * joint_probability),
+    });
+    let accepted = conformance.acceptance.as_ref().map(acceptance::said);
+    std::iter::once(first).chain(advised).chain(accepted).collect()
+}
+
+/// What is warned of.
+pub(crate) fn warnings(asked: &Asked<'_>, conformance: &Conformance) -> Vec<Finding> {
+    let joint = &conformance.joint;
+    let mut found = Vec::new();
+    let width_um = asked.tolerance.size().half_width_um().map(|half| 2.0 * half);
+    if let (Some(gauge), Some(width_um), None) = (&asked.uncertainty.measurement, width_um, &conformance.acceptance) {
+        found.push(acceptance::none_left(gauge.standard_uncertainty_um, width_um));
+    }
+    if !joint.met {
+        found.push(
+            Finding::new("improbable", "/uncertainty/wanted_probability")
+                .measured(joint.probability, joint.wanted, "1")
+                .with("percent", 100.0 * joint.probability)
+                .with("wanted_percent", 100.0 * joint.wanted),
+        );
+    }
+    found
+}
