@@ -50,6 +50,7 @@ mod feed_advice;
 mod feed_benchmarks;
 mod feed_cases;
 mod feed_claims;
+mod feed_cones;
 mod feed_continuous;
 mod feed_decisions;
 mod feed_depths;
