@@ -90,6 +90,7 @@ mod machinability_library;
 mod machinability_real;
 mod material_library;
 mod milling_answers;
+mod milling_certainty;
 mod milling_clamping;
 mod milling_receptances;
 mod milling_reference;

@@ -100,9 +100,11 @@ impl<const S: usize> Question<'_, S> {
         Ok(lines.found(lines.done()))
     }
 
-    /// The probabilities by the real model, most lines of which are those of one that is near.
+    /// The probabilities by the real model, asked on no more than `most_real` lines of a scrambling; most lines are those of one that is
+    /// near.
     pub(crate) fn of_real<const K: usize>(
         &self,
+        most_real: usize,
         real: &mut Values<'_, K>,
         near: &mut Values<'_, K>,
     ) -> Result<Found<S>, Failure> {
@@ -110,7 +112,8 @@ impl<const S: usize> Question<'_, S> {
         nearly.until(NEAR_SHARE, near)?;
         let near_error = nearly.found(nearly.done()).of[S - 1].error;
         let mut really = Lines::of(self);
-        let mut count = FIRST_LINES[1].min(nearly.done());
+        let most = most_real.min(nearly.done());
+        let mut count = FIRST_LINES[1].min(most);
         loop {
             really.extend(count, real)?;
             let found = Found {
@@ -123,10 +126,10 @@ impl<const S: usize> Question<'_, S> {
             };
             let last = found.of[S - 1];
             // More lines of the real model would not lower an error that both models share.
-            if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= nearly.done() {
+            if last.is_enough(1.0) || last.error <= NEAR_IS_ALL * near_error || count >= most {
                 return Ok(found);
             }
-            count = (2 * count).min(nearly.done());
+            count = (2 * count).min(most);
         }
     }
 }
@@ -554,7 +557,7 @@ mod tests {
         let alone = question.of(&mut |g| Ok(real(g))).unwrap();
         for offset in [0.0, 0.5, -3.0] {
             let beside =
-                question.of_real(&mut |g| Ok(real(g)), &mut |g| Ok([1.0 + offset - g[0] + 0.2 * g[2]])).unwrap();
+                question.of_real(256, &mut |g| Ok(real(g)), &mut |g| Ok([1.0 + offset - g[0] + 0.2 * g[2]])).unwrap();
             let [alone, beside] = [alone.of[0], beside.of[0]];
             let error = alone.error.hypot(beside.error);
             assert!((alone.probability - beside.probability).abs() < 1.5 * error + 1e-5, "{alone:?} {beside:?}");
@@ -565,7 +568,7 @@ mod tests {
     fn a_model_that_is_right_leaves_few_lines_to_the_real_one() {
         let plane = |g: &[f64]| [1.0 - 0.6 * g[0] - 0.8 * g[1]];
         let question = Question { axis: &[3.0, 4.0], sets: [0..=0], effort: EFFORT, monitor: &Unwatched };
-        let found = question.of_real(&mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
+        let found = question.of_real(256, &mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
         assert_eq!(found.lines, SCRAMBLINGS * FIRST_LINES[1]);
     }
 

@@ -48,7 +48,7 @@ impl Judged<'_> {
         let axis: Vec<f64> = self.axis().iter().copied().chain([0.0]).collect();
         let question = Question { axis: &axis, sets: SETS, effort: self.effort(MOST_LINES), monitor: self.monitor() };
         let by = |by: By| move |scores: &[f64]| margins(by, scores);
-        let found = question.of_real(&mut by(By::Rehearsal), &mut by(By::Surface))?;
+        let found = question.of_real(MOST_LINES, &mut by(By::Rehearsal), &mut by(By::Surface))?;
         let [good, accepted, both] = [GOOD, ACCEPTED, BOTH].map(|set| found.of[set].probability);
         Ok(Some(Acceptance {
             measuring_uncertainty_um: gauge_um,

@@ -222,7 +222,7 @@ impl<'a> Judged<'a> {
     /// The probabilities of a part that is really cut.
     fn found(&self, shift_um: f64) -> Result<Found<{ SETS.len() }>, Failure> {
         let by = |by: By| move |g: &[f64]| self.cut(by, &self.uncertainties, g, shift_um);
-        self.question(&self.axis, MOST_LINES[0]).of_real(&mut by(By::Rehearsal), &mut by(By::Surface))
+        self.question(&self.axis, MOST_LINES[0]).of_real(MOST_LINES[0], &mut by(By::Rehearsal), &mut by(By::Surface))
     }
 
     /// The probabilities by the response surface alone, on few lines: for comparisons on the same ones.
@@ -554,7 +554,7 @@ impl<'a> Judged<'a> {
         let axis = (0..count).map(change).collect::<Result<Vec<f64>, Failure>>()?;
         let question = self.question(&axis, MOST_LINES[2]);
         let by = |by: By| move |scores: &[f64]| later(by, scores);
-        let then = question.of_real(&mut by(By::Rehearsal), &mut by(By::Surface))?.of[JOINT];
+        let then = question.of_real(MOST_LINES[2], &mut by(By::Rehearsal), &mut by(By::Surface))?.of[JOINT];
         let gain = then.probability - now.probability;
         let error = now.error + then.error;
         Ok((gain > error).then(|| Improvement::MeasureFirstPart {

@@ -8,6 +8,7 @@ mod answer;
 mod job;
 pub mod model;
 
+pub use answer::conformance::MillingConformance;
 pub use answer::output::{
     ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
     ContactUse, CrossingMethod, CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind,
@@ -19,8 +20,9 @@ pub use answer::output::{
 pub use job::{
     Asked, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing,
     GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle,
-    Milling, NothingYields, PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset,
-    ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
+    Milling, MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty, NothingYields,
+    PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
+    YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 
 use crate::calculator::{
@@ -28,10 +30,14 @@ use crate::calculator::{
     Place, Table, checkpoint,
 };
 
+use crate::certainty::picture::LABEL_CODES as DOUBT_CODES;
+use crate::certainty::{DISTRIBUTION_CODES, MISSING_CODES, QUANTITY_CODES, Quantity};
+use crate::fixture_stability::IMPROBABLE_CODES;
 use crate::receptance_fit::{FAILURE_CODES, FAULT_CODES, ReceptanceFit, WARNING_CODES as FIT_WARNING_CODES};
 
-use answer::{Study, advice, outcome, picture};
-use job::{Case, fits, guessed, range_rpm, too_expensive};
+use answer::conformance::draws;
+use answer::{Study, advice, conformance, outcome, picture};
+use job::{Case, clamped, fits, guessed, range_rpm, too_expensive, uncertainties};
 use model::MOST_OSCILLATIONS;
 
 /// The calculator.
@@ -45,7 +51,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 4,
+        version: 5,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \
@@ -85,6 +91,11 @@ impl Calculator for MillingStability {
                 title: "Part in a vise: does the clamp force at hand hold it along the whole cut?",
                 job: include_str!("examples/clamped.json"),
             },
+            Example {
+                id: "how_sure",
+                title: "One cutter, one mode: how probably 2 mm stay quiet, and what makes it uncertain",
+                job: include_str!("examples/how_sure.json"),
+            },
         ],
         hallmarks: &[
             Hallmark::Of("/cutter/diameter_mm"),
@@ -101,6 +112,8 @@ impl Calculator for MillingStability {
             "/force/motor_power_kw",
             "/motion/peak_to_peak_um",
             "/clamping/clamp_force_min_n",
+            "/conformance/joint/probability",
+            "/conformance/depth_at_wanted_mm",
         ],
         codes: CODES,
         figures: picture::FIGURE_IDS,
@@ -180,6 +193,8 @@ const SLOW_MOTION_MS: f64 = 60.0;
 
 /// Clamping: loads of a period at one place of the cut, on a dozen contacts; of a dozen times as many where the law bends.
 const CLAMPING_MS: f64 = 15.0;
+/// Share of it that loads take which go with the force of the cut.
+const RIGID_LOADS: f64 = 0.1;
 /// Halvings of the depth at which a clamp force gives out.
 const CLAMP_DEPTHS: f64 = 8.0;
 
@@ -271,6 +286,9 @@ fn cost_of_modes(job: &Job) -> Cost {
         let others = 2.0 + directions + 2.0 * f64::from(u8::from(case.milling.law.bends()));
         parts.push(((1.0 + FIRST_ALONE * others) * steps * PER_SEARCH * here, "/limits/depths"));
     }
+    if job.asks(Asked::Certainty) {
+        parts.push((certainty_ms(job, &case), "/analyses"));
+    }
     if job.asks(Asked::Proposals) {
         // Some dozen cutters over a turn, whose elements are those of all teeth.
         let teeth = case.milling.teeth.len() as f64;
@@ -303,6 +321,23 @@ fn cost_of_modes(job: &Job) -> Cost {
     let driver = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or("/cut", |(_, driver)| driver);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     Cost { ms, bytes: bytes as u64, driver }
+}
+
+/// Of the probability: draws of the real model, each with its multiplier, its motion and its loads as far as they are limited.
+fn certainty_ms(job: &Job, case: &Case) -> f64 {
+    let Ok(of) = uncertainties(job, &case.structure, &[]) else { return 0.0 };
+    let mut names: Vec<&str> = of.of.iter().map(|one| one.quantity.name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let limits = &job.limits;
+    let moves = [limits.amplitude_max_um, limits.surface_error_max_um, limits.roughness_max_um];
+    let motion_ms = if moves.iter().any(Option::is_some) { by_elements_ms(case, &case.rotation) } else { 0.0 };
+    let loads = if case.structure.modes.iter().any(|mode| mode.side == model::Side::Work) { 1.0 } else { RIGID_LOADS };
+    let clamping_ms = clamped(job).map_or(0.0, |(of, _)| {
+        let places = of.places_mm(job.cut.feed_direction_deg).map_or(1, |places| places.len());
+        places as f64 * CLAMPING_MS * loads
+    });
+    draws(of.of.len(), names.len()) * (ON_MAP * point_ms(case, &case.rotation) + motion_ms + clamping_ms)
 }
 
 /// The equations that acted.
@@ -354,6 +389,10 @@ fn basis(job: &Job, study: &Study<'_>) -> Vec<Basis> {
             used.push(Basis { equation: "milling/7.26", source: "the same at every width" });
         }
     }
+    if job.asks(Asked::Certainty) {
+        used.push(Basis { equation: "certainty/3.2", source: "lines over a response surface and the real cut" });
+        used.push(Basis { equation: "certainty/6.1", source: "limits together" });
+    }
     if job.asks(Asked::Proposals) {
         used.push(Basis { equation: "milling/7.27", source: "cutters tried" });
     }
@@ -371,10 +410,10 @@ fn basis(job: &Job, study: &Study<'_>) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[job::CODES, FAULT_CODES[0], FAULT_CODES[1]],
+    faults: &[job::CODES, FAULT_CODES[0], FAULT_CODES[1], DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES],
     failures: &[FAILURE_CODES],
-    warnings: &[advice::WARNING_CODES, FIT_WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES],
+    warnings: &[advice::WARNING_CODES, FIT_WARNING_CODES, IMPROBABLE_CODES],
+    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, &["probably_quiet_depth"]],
     stages: &[&[
         "stage_multiplier",
         "stage_intervals",
@@ -384,7 +423,8 @@ const CODES: Codes = Codes {
         "stage_map",
         "stage_speeds",
         "stage_proposals",
+        "stage_certainty",
         "stage_done",
     ]],
-    labels: &[picture::LABEL_CODES],
+    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, DOUBT_CODES],
 };
