@@ -3,7 +3,10 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Level, Source};
+use crate::calculator::{Finding, Message};
+
+use super::lines::Estimate;
+use super::{Level, Source, bounded};
 
 /// How probable it is that a part is good, what makes that uncertain and what would help.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -128,6 +131,58 @@ pub struct Contribution {
     /// Probability of all limits with half of its width, all else equal; null where that would take long and nobody asked.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub joint_probability_if_halved: Option<f64>,
+}
+
+impl LimitKept {
+    /// One that is passed in one way alone.
+    pub(crate) fn of((limit, pointer): (&str, &str), found: Estimate) -> Self {
+        Self {
+            limit: limit.to_owned(),
+            pointer: pointer.to_owned(),
+            probability: bounded(found.probability),
+            numerical_error: found.error,
+            probability_above: None,
+            probability_below: None,
+        }
+    }
+}
+
+impl JointlyKept {
+    /// Against the probability that is wanted.
+    pub(crate) fn of(found: Estimate, wanted: f64) -> Self {
+        let probability = bounded(found.probability);
+        Self { probability, numerical_error: found.error, wanted, met: probability >= wanted }
+    }
+}
+
+/// What is said of a probability: what it is, the limit that is passed most often, and what makes most of the doubt.
+pub(crate) fn probably(
+    code: &'static str,
+    joint: &JointlyKept,
+    limits: &[LimitKept],
+    contributions: &[Contribution],
+) -> Message {
+    let mut said = Message::new(code)
+        .with("percent", 100.0 * joint.probability)
+        .with("wanted_percent", 100.0 * joint.wanted)
+        .with("met", if joint.met { "yes" } else { "no" });
+    if let Some(least) = limits.iter().min_by(|a, b| a.probability.total_cmp(&b.probability)) {
+        said = said.with("limit", least.limit.clone()).with("limit_percent", 100.0 * least.probability);
+    }
+    match contributions.first().and_then(|largest| Some((largest, largest.share_of_variance?))) {
+        Some((largest, share)) => said.with("quantity", largest.quantity.clone()).with("share_percent", 100.0 * share),
+        None => said,
+    }
+}
+
+/// The warning where a probability is less than wanted.
+pub(crate) fn improbable(code: &'static str, joint: &JointlyKept) -> Option<Finding> {
+    (!joint.met).then(|| {
+        Finding::new(code, "/uncertainty/wanted_probability")
+            .measured(joint.probability, joint.wanted, "1")
+            .with("percent", 100.0 * joint.probability)
+            .with("wanted_percent", 100.0 * joint.wanted)
+    })
 }
 
 impl Contribution {

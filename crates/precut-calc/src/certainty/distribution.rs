@@ -102,6 +102,8 @@ pub enum Source {
     Default,
     /// The job states it.
     Stated,
+    /// What the job has measured tells it.
+    Measured,
 }
 
 /// In what the width of a quantity is given.
@@ -204,6 +206,11 @@ impl Distribution {
                 standard_uncertainty_um * student(score, degrees_of_freedom)
             }
         }
+    }
+
+    /// Whether it leaves anything open: a quantity without width is known.
+    pub(crate) fn is_wide(&self) -> bool {
+        (self.at(1.0) - self.at(-1.0)).abs() > 0.0
     }
 
     /// Relative standard deviation of a factor, that of its logarithm where that is normal.

@@ -101,13 +101,15 @@ impl<const S: usize> Question<'_, S> {
         Ok(lines.found(lines.done()))
     }
 
-    /// The probabilities by the real model, most lines of which are those of one that is near.
+    /// The probabilities by the real model, asked on no more than `most_real` lines of a scrambling; most lines are those of one that is
+    /// near.
     pub(crate) fn of_real<const K: usize>(
         &self,
+        most_real: usize,
         real: &mut Values<'_, K>,
         near: &mut Values<'_, K>,
     ) -> Result<Found<S>, Failure> {
-        self.of_both(usize::MAX, near, &mut |_, at| Line::scanned(&mut |place| real(&at(place))))
+        self.of_both(most_real, near, &mut |_, at| Line::scanned(&mut |place| real(&at(place))))
     }
 
     /// The same of a real model that costs much. On its lines it is asked only near the places where the near model passes a limit: it
@@ -479,7 +481,7 @@ mod tests {
         let alone = question.of(&mut |g| Ok(real(g))).unwrap();
         for offset in [0.0, 0.5, -3.0] {
             let beside =
-                question.of_real(&mut |g| Ok(real(g)), &mut |g| Ok([1.0 + offset - g[0] + 0.2 * g[2]])).unwrap();
+                question.of_real(256, &mut |g| Ok(real(g)), &mut |g| Ok([1.0 + offset - g[0] + 0.2 * g[2]])).unwrap();
             let [alone, beside] = [alone.of[0], beside.of[0]];
             let error = alone.error.hypot(beside.error);
             assert!((alone.probability - beside.probability).abs() < 1.5 * error + 1e-5, "{alone:?} {beside:?}");
@@ -511,7 +513,7 @@ mod tests {
     fn a_model_that_is_right_leaves_few_lines_to_the_real_one() {
         let plane = |g: &[f64]| [1.0 - 0.6 * g[0] - 0.8 * g[1]];
         let question = Question { axis: &[3.0, 4.0], sets: [0..=0], effort: EFFORT, monitor: &Unwatched };
-        let found = question.of_real(&mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
+        let found = question.of_real(256, &mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
         assert_eq!(found.lines, SCRAMBLINGS * FIRST_LINES[1]);
     }
 

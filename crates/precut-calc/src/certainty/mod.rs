@@ -5,6 +5,9 @@
 //! along one line through the scores and by scrambled Sobol points over the others (`lines`).
 
 mod answer;
+pub(crate) mod around;
+pub(crate) mod block;
+pub(crate) mod deepest;
 mod distribution;
 mod line;
 pub(crate) mod lines;
@@ -16,6 +19,8 @@ mod surface;
 pub use answer::{
     Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts,
 };
+pub(crate) use answer::{improbable, probably};
+pub(crate) use block::{Block, uncertainty_block};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};
 pub(crate) use quantities::{

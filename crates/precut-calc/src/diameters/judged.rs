@@ -224,7 +224,11 @@ impl<'a> Judged<'a> {
         model: &mut Values<'_, K>,
         surface: &mut Values<'_, K>,
     ) -> Result<Found<S>, Failure> {
-        if self.parts.cost_much() { question.of_costly(model, surface) } else { question.of_real(model, surface) }
+        if self.parts.cost_much() {
+            question.of_costly(model, surface)
+        } else {
+            question.of_real(question.effort.most_lines, model, surface)
+        }
     }
 
     /// The probabilities of a part that is really cut.

@@ -4,9 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, Monitor};
-use crate::certainty::lines::{Effort, Found, Margins, Question, Together};
+use crate::certainty::around::{Around, Asked, Real, far};
+use crate::certainty::deepest::deepest_mm;
+use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{
-    ConformanceMethod, Contribution, JointlyKept, LimitKept, Quantity, Surface, Uncertainties, bounded, normal_quantile,
+    ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, bounded, improbable, probably,
 };
 
 use super::acting::Case;
@@ -28,22 +30,15 @@ const NAMES: [(&str, &str); LIMITS] =
 /// Sets of them of which the probability is asked: each alone, then all.
 const SETS: [Together; 4] = [STABLE..=STABLE, CLOSED..=CLOSED, HELD..=HELD, STABLE..=HELD];
 const ALL: usize = 3;
-/// Most lines of one scrambling.
-const MOST_LINES: usize = 16;
+/// Most lines of one scrambling: of the response surface, and of vises.
+const MOST_LINES: [usize; 2] = [16; 2];
 /// Lines of one scrambling on which vises are compared.
 const COMPARED_LINES: usize = 4;
-/// A margin beyond this, of a logarithm, is as good as without end.
-const FAR: f64 = 50.0;
-/// Steps toward the depth of a probability, and how near to it is enough, in standard normal scores.
-const DEPTH_STEPS: usize = 12;
-const NEAR_ENOUGH: f64 = 0.01;
-/// Change of the logarithm of the depth by which the way to the wanted probability is begun.
-const FIRST_STEP: f64 = 0.1;
 
 /// Codes of what is said here.
 pub(super) const EXPLANATION_CODES: &[&str] = &["probably_quiet", "probably_quiet_depth"];
 /// Codes of the warnings made here.
-pub(super) const WARNING_CODES: &[&str] = &["improbable_cut"];
+pub(crate) const WARNING_CODES: &[&str] = &["improbable_cut"];
 
 /// How probable it is that the cut stays quiet, and what makes that uncertain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -72,20 +67,6 @@ pub(super) struct Judged<'a> {
     uncertainties: Uncertainties<FixtureQuantity>,
     /// Which limits there are.
     limits: Vec<usize>,
-}
-
-/// The same at one working point, with a response surface about it.
-struct There<'a> {
-    of: &'a Judged<'a>,
-    working: Working,
-    surface: Surface,
-    /// Standard deviation of the logarithm of every quantity.
-    scales: Vec<f64>,
-    /// Change of every limit with every independent score.
-    slopes: Vec<Vec<f64>>,
-    deciding: usize,
-    /// Along which limits change together, each as much as it is near.
-    axis: Vec<f64>,
 }
 
 impl<'a> Judged<'a> {
@@ -133,43 +114,41 @@ impl<'a> Judged<'a> {
         Ok(margins)
     }
 
-    /// Margins at what quantities come to; of a vise without an answer none is kept.
+    /// About a working point; `real` are the margins there.
+    fn around<'b>(&'b self, real: &'b Real<'b, LIMITS>) -> Result<Around<'b, FixtureQuantity, LIMITS, 4>, Failure> {
+        Around::of(Asked {
+            uncertainties: &self.uncertainties,
+            limits: &self.limits,
+            sets: SETS,
+            seed: self.job.uncertainty.seed,
+            most_lines: MOST_LINES,
+            monitor: self.monitor,
+            real,
+        })
+    }
+
     fn tried(&self, factors: &[f64], working: Working) -> Result<Margins<LIMITS>, Failure> {
-        match self.margins(&drawn(self.case, &self.uncertainties, factors), working) {
-            Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok([f64::NEG_INFINITY; LIMITS]),
-            found => found,
-        }
+        self.margins(&drawn(self.case, &self.uncertainties, factors), working)
     }
 
     /// The block of the answer. `deepest_mm` where a depth is looked for, too, and how deep.
     pub(super) fn conformance(&self, deepest_mm: Option<f64>) -> Result<FixtureConformance, Failure> {
-        let there = There::new(self, self.case.working)?;
-        let found = there.found()?;
-        let joint = found.of[ALL];
+        let real = |factors: &[f64]| self.tried(factors, self.case.working);
+        let around = self.around(&real)?;
+        let found = around.found()?;
         let wanted = self.job.uncertainty.wanted_probability;
-        let probability = bounded(joint.probability);
-        let kept = |&limit: &usize| {
-            let (name, pointer) = NAMES[limit];
-            LimitKept {
-                limit: name.to_owned(),
-                pointer: pointer.to_owned(),
-                probability: bounded(found.of[limit].probability),
-                numerical_error: found.of[limit].error,
-                probability_above: None,
-                probability_below: None,
-            }
-        };
+        let compared = deepest_mm.map(|_| COMPARED_LINES);
         Ok(FixtureConformance {
-            limits: self.limits.iter().map(kept).collect(),
-            joint: JointlyKept { probability, numerical_error: joint.error, wanted, met: probability >= wanted },
-            contributions: there.contributions(joint.probability, deepest_mm.is_some())?,
+            limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
+            joint: JointlyKept::of(found.of[ALL], wanted),
+            contributions: around.contributions(&found, compared)?,
             depth_at_wanted_mm: match deepest_mm {
                 Some(deepest_mm) => self.depth_mm(self.case.working, wanted, deepest_mm)?,
                 None => None,
             },
             method: ConformanceMethod {
                 integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
-                linear_probability: bounded(there.linear_probability()?),
+                linear_probability: bounded(around.linear_probability()?),
                 seed: self.job.uncertainty.seed,
             },
         })
@@ -177,192 +156,30 @@ impl<'a> Judged<'a> {
 
     /// The probability that all limits are kept at another working point.
     pub(super) fn probability(&self, working: Working) -> Result<f64, Failure> {
-        Ok(bounded(There::new(self, working)?.found()?.of[ALL].probability))
+        let real = |factors: &[f64]| self.tried(factors, working);
+        Ok(bounded(self.around(&real)?.found()?.of[ALL].probability))
     }
 
-    /// Deepest cut up to `deepest_mm` with which all limits are kept with a probability: what is wanted of the standard normal
-    /// score is nearly straight over the logarithm of the depth. `None` where not even a thousandth of it is.
-    pub(super) fn depth_mm(&self, working: Working, wanted: f64, deepest_mm: f64) -> Result<Option<f64>, Failure> {
-        let over = |depth_mm: f64| -> Result<f64, Failure> {
-            let probability = self.probability(Working { depth_mm, ..working })?;
-            // From the side on which the probability is kept.
-            Ok(normal_quantile(probability) - normal_quantile(wanted) - 0.5 * NEAR_ENOUGH)
-        };
-        let (mut low, mut high) = (None, None);
-        let least_mm = 1e-3 * deepest_mm;
-        let mut depth_mm = working.depth_mm.clamp(least_mm, deepest_mm);
-        let mut step = FIRST_STEP;
-        for _ in 0..2 * DEPTH_STEPS {
-            let here = over(depth_mm)?;
-            if here.abs() < 0.5 * NEAR_ENOUGH {
-                return Ok(Some(depth_mm));
-            }
-            if here > 0.0 {
-                low = Some((depth_mm, here));
-            } else {
-                high = Some((depth_mm, here));
-            }
-            depth_mm = match (low, high) {
-                (Some((from, above)), Some((to, below))) => {
-                    let share: f64 = above / (above - below);
-                    from * (to / from).powf(share.clamp(0.1, 0.9))
-                }
-                (Some((from, _)), None) if from >= deepest_mm => return Ok(Some(deepest_mm)),
-                (None, Some((to, _))) if to <= least_mm => return Ok(None),
-                (Some((from, _)), None) => (from * step.exp()).min(deepest_mm),
-                (None, Some((to, _))) => (to * (-step).exp()).max(least_mm),
-                (None, None) => return Ok(None),
-            };
-            step *= 2.0;
-        }
-        Ok(low.map(|(depth_mm, _)| depth_mm))
-    }
-}
-
-/// A margin as it may be counted with.
-fn far(margin: f64) -> f64 {
-    margin.clamp(-FAR, FAR)
-}
-
-impl<'a> There<'a> {
-    fn new(of: &'a Judged<'a>, working: Working) -> Result<Self, Failure> {
-        let scale = |(_, one): (usize, &crate::certainty::Uncertain<FixtureQuantity>)| {
-            0.5 * (one.distribution.at(1.0) / one.distribution.at(-1.0)).ln()
-        };
-        let scales: Vec<f64> = of.uncertainties.of.iter().enumerate().map(scale).collect();
-        let medians: Vec<f64> = of.uncertainties.of.iter().map(|one| one.distribution.at(0.0)).collect();
-        let surface = Surface::of(&vec![true; scales.len()], &mut |x| {
-            let factor = |i: usize| medians[i] * (scales[i] * x[i]).exp();
-            let margins = of.tried(&(0..x.len()).map(factor).collect::<Vec<_>>(), working)?;
-            Ok(of.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())
-        })?;
-        let mut there = Self { of, working, surface, scales, slopes: Vec::new(), deciding: 0, axis: Vec::new() };
-        there.set_slopes();
-        Ok(there)
-    }
-
-    /// Margins by the response surface; infinite where there is no limit.
-    fn near(&self, of: &Uncertainties<FixtureQuantity>, independent: &[f64], is_bent: bool) -> Margins<LIMITS> {
-        let medians = self.of.uncertainties.of.iter().map(|one| one.distribution.at(0.0));
-        let values = of.values(independent);
-        let x: Vec<f64> = values
-            .iter()
-            .zip(medians)
-            .zip(&self.scales)
-            .map(|((value, median), scale)| (value / median).ln() / scale)
-            .collect();
-        let found = if is_bent { self.surface.at(&x) } else { self.surface.linear_at(&x) };
-        let mut margins = [f64::INFINITY; LIMITS];
-        self.of.limits.iter().zip(found).for_each(|(&limit, margin)| margins[limit] = margin);
-        margins
-    }
-
-    /// Sets how the limits change with independent scores, and which is nearest by them.
-    fn set_slopes(&mut self) {
-        let count = self.scales.len();
-        let uncertainties = &self.of.uncertainties;
-        let change = |index: usize, limit: usize| {
-            let at = |score: f64| {
-                let mut independent = vec![0.0; count];
-                independent[index] = score;
-                self.near(uncertainties, &independent, true)[limit]
-            };
-            at(0.5) - at(-0.5)
-        };
-        let slopes: Vec<Vec<f64>> =
-            self.of.limits.iter().map(|&limit| (0..count).map(|index| change(index, limit)).collect()).collect();
-        let lengths: Vec<f64> =
-            slopes.iter().map(|of| of.iter().map(|s| s * s).sum::<f64>().sqrt().max(1e-12)).collect();
-        let distances: Vec<f64> =
-            self.surface.at_point().iter().zip(&lengths).map(|(margin, length)| margin / length).collect();
-        self.deciding = (0..distances.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
-        // A limit that lies across the lines would leave a step from line to line; one that is far away does not matter.
-        let weight = |limit: usize| {
-            let beyond = distances[limit] - distances[self.deciding].max(0.0);
-            (-0.5 * beyond * beyond).exp() / lengths[limit]
-        };
-        let along = |index: usize| (0..slopes.len()).map(|limit| weight(limit) * slopes[limit][index]).sum();
-        self.axis = (0..count).map(along).collect();
-        self.slopes = slopes;
-    }
-
-    fn question(&self, most_lines: usize) -> Question<'_, { SETS.len() }> {
-        let effort = Effort { seed: self.of.job.uncertainty.seed, most_lines };
-        Question { axis: &self.axis, sets: SETS, effort, monitor: self.of.monitor }
-    }
-
-    fn found(&self) -> Result<Found<{ SETS.len() }>, Failure> {
-        let of = &self.of.uncertainties;
-        let mut real = |g: &[f64]| self.of.tried(&of.values(g), self.working);
-        self.question(MOST_LINES).of_real(&mut real, &mut |g: &[f64]| Ok(self.near(of, g, true)))
-    }
-
-    /// The probability of all limits by a straight model.
-    fn linear_probability(&self) -> Result<f64, Failure> {
-        let of = &self.of.uncertainties;
-        Ok(self.question(MOST_LINES).of(&mut |g: &[f64]| Ok(self.near(of, g, false)))?.of[ALL].probability)
-    }
-
-    /// What the doubt is made of; where it is asked, what half of a width makes of it: by how much the vises differ from those of
-    /// the whole width on the same few lines.
-    fn contributions(&self, probability: f64, asks: bool) -> Result<Vec<Contribution>, Failure> {
-        let of = &self.of.uncertainties;
-        let slopes = &self.slopes[self.deciding];
-        let variance: f64 = slopes.iter().map(|s| s * s).sum();
-        let on_few = |of: &Uncertainties<FixtureQuantity>| -> Result<f64, Failure> {
-            let mut real = |g: &[f64]| self.of.tried(&of.values(g), self.working);
-            Ok(self.question(COMPARED_LINES).of(&mut real)?.of[ALL].probability)
-        };
-        let now = if asks { Some(on_few(of)?) } else { None };
-        let mut all = Vec::new();
-        for (index, one) in of.of.iter().enumerate() {
-            let share = if variance > 0.0 { slopes[index] * slopes[index] / variance } else { 0.0 };
-            let halved = match now {
-                Some(now) => Some(bounded(probability + on_few(&of.halved(index))? - now)),
-                None => None,
-            };
-            all.push(Contribution {
-                quantity: one.quantity.name().to_owned(),
-                source: one.source,
-                level: one.level,
-                share_of_variance: of.scores.is_independent().then_some(share),
-                joint_probability_if_halved: halved,
-            });
-        }
-        Contribution::sort(&mut all);
-        Ok(all)
+    /// Deepest cut up to `most_mm` with which all limits are kept with a probability; `None` where not even a thousandth of it is.
+    pub(super) fn depth_mm(&self, working: Working, wanted: f64, most_mm: f64) -> Result<Option<f64>, Failure> {
+        deepest_mm(working.depth_mm, most_mm, wanted, &mut |depth_mm| self.probability(Working { depth_mm, ..working }))
     }
 }
 
 /// What is said of it.
 pub(super) fn said(conformance: &FixtureConformance) -> Vec<Message> {
-    let joint = &conformance.joint;
-    let mut first = Message::new("probably_quiet")
-        .with("percent", 100.0 * joint.probability)
-        .with("wanted_percent", 100.0 * joint.wanted)
-        .with("met", if joint.met { "yes" } else { "no" });
-    let least = conformance.limits.iter().min_by(|a, b| a.probability.total_cmp(&b.probability));
-    if let Some(least) = least {
-        first = first.with("limit", least.limit.clone()).with("limit_percent", 100.0 * least.probability);
-    }
-    if let Some(largest) = conformance.contributions.iter().find(|one| one.share_of_variance.is_some()) {
-        first = first
-            .with("quantity", largest.quantity.clone())
-            .with("share_percent", 100.0 * largest.share_of_variance.unwrap_or(0.0));
-    }
-    let deep = conformance.depth_at_wanted_mm.map(|depth_mm| {
-        Message::new("probably_quiet_depth").with("depth_mm", depth_mm).with("wanted_percent", 100.0 * joint.wanted)
-    });
+    let FixtureConformance { limits, joint, contributions, .. } = conformance;
+    let first = probably("probably_quiet", joint, limits, contributions);
+    let deep = conformance.depth_at_wanted_mm.map(|depth_mm| quiet_to(depth_mm, joint));
     std::iter::once(first).chain(deep).collect()
+}
+
+/// How deep one may cut with the wanted probability.
+pub(crate) fn quiet_to(depth_mm: f64, joint: &JointlyKept) -> Message {
+    Message::new("probably_quiet_depth").with("depth_mm", depth_mm).with("wanted_percent", 100.0 * joint.wanted)
 }
 
 /// What is warned of.
 pub(super) fn warnings(conformance: &FixtureConformance) -> Option<Finding> {
-    let joint = &conformance.joint;
-    (!joint.met).then(|| {
-        Finding::new("improbable_cut", "/uncertainty/wanted_probability")
-            .measured(joint.probability, joint.wanted, "1")
-            .with("percent", 100.0 * joint.probability)
-            .with("wanted_percent", 100.0 * joint.wanted)
-    })
+    improbable("improbable_cut", &conformance.joint)
 }

@@ -44,6 +44,7 @@ mod slip;
 mod slow;
 mod speeds;
 mod uncertain;
+pub(crate) mod usual_scatter;
 mod zeroth;
 
 pub use conformance::FixtureConformance;
@@ -62,6 +63,7 @@ pub use output::{
 };
 
 pub(crate) use check::{check_characteristic, check_friction};
+pub(crate) use conformance::{WARNING_CODES as IMPROBABLE_CODES, quiet_to};
 pub(crate) use cutting::engagement_rad;
 pub(crate) use drive::power_kw;
 pub(crate) use input::FrictionRange;

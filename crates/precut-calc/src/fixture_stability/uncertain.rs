@@ -5,21 +5,13 @@ use utoipa::ToSchema;
 
 use crate::calculator::Violations;
 use crate::certainty::{
-    Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
-    check_correlations, check_presence, check_quantities,
+    Block, Contradiction, Distribution, Level, Quantity, Uncertainties, WidthUnit, uncertainty_block,
 };
 
 use super::acting::Case;
 use super::holding::Joint;
 use super::input::{FixtureJob, Vise};
-
-/// Standard deviation of the logarithm of what nobody states.
-const JOINT_STIFFNESS: f64 = 0.10;
-const DAMPING: f64 = 0.30;
-const CUTTING_FORCE: f64 = 0.10;
-const SET_BY_HAND: f64 = 0.15;
-const SET_BY_PRESSURE: f64 = 0.05;
-const FRICTION: f64 = 0.20;
+use super::usual_scatter::{CUTTING_FORCE, DAMPING, FRICTION, JOINT_STIFFNESS, SET_BY_HAND, SET_BY_PRESSURE};
 
 /// A quantity that is not known exactly; all are factors on what the job states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -106,103 +98,35 @@ pub(super) struct Drawn {
     pub friction: f64,
 }
 
-/// What is uncertain, and which probability is wanted.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FixtureUncertainty {
-    /// What is uncertain, in place of what is usual or beside it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 8, extensions(("x-advanced" = json!(true))))]
-    pub quantities: Vec<FixtureUncertainQuantity>,
-    /// Which of them go together.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 28, extensions(("x-advanced" = json!(true))))]
-    pub correlations: Vec<FixtureCorrelation>,
-    /// Whether what is usual is uncertain, too, where nothing is said of it: stiffness and damping of the joints, cutting force,
-    /// clamp force, friction.
-    #[serde(default = "yes")]
-    #[schema(default = true, example = true)]
-    pub defaults: bool,
-    /// Probability of a quiet cut that is wanted; below it the answer warns.
-    #[serde(default = "nineteen_of_twenty")]
-    #[schema(exclusive_minimum = 0.0, exclusive_maximum = 1.0, default = 0.95, example = 0.95, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("P"))))]
-    pub wanted_probability: f64,
-    /// Seed of the points over which probabilities are integrated.
-    #[serde(default = "one")]
-    #[schema(minimum = 0, maximum = 100_000_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("seed"))))]
-    pub seed: u32,
-}
-
-fn yes() -> bool {
-    true
-}
-
-fn nineteen_of_twenty() -> f64 {
-    0.95
-}
-
-fn one() -> u32 {
-    1
-}
-
-impl Default for FixtureUncertainty {
-    fn default() -> Self {
-        Self {
-            quantities: Vec::new(),
-            correlations: Vec::new(),
-            defaults: yes(),
-            wanted_probability: nineteen_of_twenty(),
-            seed: one(),
-        }
+uncertainty_block! {
+    /// What is uncertain, and which probability is wanted.
+    FixtureUncertainty {
+        quantities: FixtureUncertainQuantity of FixtureQuantity (max_items = 8, extensions(("x-advanced" = json!(true)))), such as "damping";
+        correlations: FixtureCorrelation (28), such as ["joint_stiffness", "damping"];
+        /// Whether what is usual is uncertain, too, where nothing is said of it: stiffness and damping of the joints, cutting force,
+        /// clamp force, friction.
+        defaults;
+        /// Probability of a quiet cut that is wanted; below it the answer warns.
+        wanted_probability;
     }
 }
 
-/// How a quantity is distributed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FixtureUncertainQuantity {
-    /// Which.
-    #[schema(example = "damping")]
-    pub quantity: FixtureQuantity,
-    /// How it is distributed about what the job states.
-    pub distribution: Distribution,
-}
-
-/// How two quantities go together.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FixtureCorrelation {
-    /// Which two.
-    #[schema(min_items = 2, max_items = 2, example = json!(["joint_stiffness", "damping"]))]
-    pub between: Vec<FixtureQuantity>,
-    /// Correlation of their standard normal scores.
-    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 1.0, example = 0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho"))))]
-    pub coefficient: f64,
-}
-
-/// All quantities of a checked job that are uncertain, and how they go together.
+/// All quantities of a checked job that are uncertain, and how they go together: those that it states, then the usual ones.
 pub(super) fn uncertainties(job: &FixtureJob) -> Result<Uncertainties<FixtureQuantity>, Contradiction> {
-    let stated = &job.uncertainty;
-    let of = |quantity, distribution, source| Uncertain { quantity, distribution, level: Level::Setup, source };
-    let mut all: Vec<_> = stated
-        .quantities
-        .iter()
-        .map(|one| of(one.quantity, one.distribution.clone(), Source::Stated))
-        .filter(|one| one.distribution.relative() > 0.0)
-        .collect();
-    let names = |quantity: FixtureQuantity| stated.quantities.iter().any(|one| one.quantity == quantity);
-    let parts_are_stated = stated.quantities.iter().any(|one| one.quantity.is_of_joints());
-    for (quantity, log_standard_deviation) in usual(job) {
-        let is_stated = names(quantity) || quantity == FixtureQuantity::JointStiffness && parts_are_stated;
-        if stated.defaults && !is_stated {
-            all.push(of(quantity, Distribution::Lognormal { log_standard_deviation }, Source::Default));
-        }
-    }
-    Uncertainties::new(all, pairs(stated))
-}
-
-fn pairs(stated: &FixtureUncertainty) -> Vec<Pair<'_, FixtureQuantity>> {
-    stated.correlations.iter().map(|pair| (&pair.between[..], pair.coefficient)).collect()
+    let block = &job.uncertainty;
+    let stated: Vec<FixtureQuantity> = block.quantities.iter().map(|one| one.quantity).collect();
+    let usual = usual(job);
+    let is_left = |quantity: &FixtureQuantity| {
+        let has_parts = *quantity == FixtureQuantity::JointStiffness && stated.iter().any(|one| one.is_of_joints());
+        !has_parts && !stated.contains(quantity)
+    };
+    let of_usual = |quantity: FixtureQuantity| {
+        let own = usual.iter().find(|(usual, _)| *usual == quantity);
+        own.map(|&(_, log_standard_deviation)| Distribution::Lognormal { log_standard_deviation })
+    };
+    let left = usual.iter().map(|(quantity, _)| *quantity).filter(is_left);
+    let of = |quantity| block.uncertain(quantity, Level::Setup, of_usual(quantity));
+    Uncertainties::new(stated.iter().copied().chain(left).filter_map(of).collect(), block.pairs())
 }
 
 /// What is uncertain in every job that has it: quantities and the standard deviation of their logarithm.
@@ -229,9 +153,5 @@ pub(super) fn drawn(case: &Case, of: &Uncertainties<FixtureQuantity>, factors: &
 
 /// Finds what cannot be.
 pub(super) fn check(job: &FixtureJob, violations: &mut Violations) {
-    let stated = &job.uncertainty;
-    let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
-    check_quantities(&quantities, violations);
-    check_correlations(&pairs(stated), || uncertainties(job).err(), violations);
-    check_presence(stated.quantities.iter().map(|one| one.quantity), |quantity| quantity.missing_in(job), violations);
+    job.uncertainty.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
 }

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, checkpoint};
-use crate::certainty::lines::{Effort, Estimate, Question, SCRAMBLINGS, Sampled};
+use crate::certainty::lines::{Effort, Question, SCRAMBLINGS, Sampled};
 use crate::certainty::{
     Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties, WidthUnit, bounded,
-    normal_below,
+    improbable, normal_below, probably,
 };
 
 use super::causes::nodes;
@@ -139,13 +139,8 @@ pub(super) fn conformance(
     let length = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
     let wanted = job.uncertainty.wanted_probability;
     Ok(RingConformance {
-        limits: vec![kept(found)],
-        joint: JointlyKept {
-            probability: bounded(found.probability),
-            numerical_error: found.error,
-            wanted,
-            met: found.probability >= wanted,
-        },
+        limits: vec![LimitKept::of(("roundness", POINTER), found)],
+        joint: JointlyKept::of(found, wanted),
         roundness_low_um: judged.roundness_um(0.05, &below)?,
         roundness_median_um: judged.roundness_um(0.5, &below)?,
         roundness_high_um: judged.roundness_um(0.95, &below)?,
@@ -155,17 +150,6 @@ pub(super) fn conformance(
         rings_cut: u32::try_from(sampled.asked()).unwrap_or(u32::MAX),
         linear_probability: bounded(normal_below(surface.at_point()[0] / length.max(1e-9))),
     })
-}
-
-fn kept(found: Estimate) -> LimitKept {
-    LimitKept {
-        limit: "roundness".to_owned(),
-        pointer: POINTER.to_owned(),
-        probability: bounded(found.probability),
-        numerical_error: found.error,
-        probability_above: None,
-        probability_below: None,
-    }
 }
 
 impl Judged<'_> {
@@ -296,28 +280,13 @@ fn value_at(quantity: RingQuantity, distribution: &crate::certainty::Distributio
 
 /// What the answer says of it.
 pub(super) fn said(found: &RingConformance) -> Message {
-    let joint = &found.joint;
-    let said = Message::new("probably_round")
-        .with("percent", 100.0 * joint.probability)
-        .with("wanted_percent", 100.0 * joint.wanted)
-        .with("met", if joint.met { "yes" } else { "no" })
+    probably("probably_round", &found.joint, &[], &found.contributions)
         .with("low_um", found.roundness_low_um)
         .with("high_um", found.roundness_high_um)
-        .with("at_wanted_um", found.roundness_at_wanted_um);
-    match found.contributions.first().and_then(|largest| Some((largest, largest.share_of_variance?))) {
-        Some((largest, share)) => said.with("quantity", largest.quantity.clone()).with("share_percent", 100.0 * share),
-        None => said,
-    }
+        .with("at_wanted_um", found.roundness_at_wanted_um)
 }
 
 /// The warning where it is less probable than wanted.
 pub(super) fn warning(found: &RingConformance) -> Option<Finding> {
-    let joint = &found.joint;
-    (!joint.met).then(|| {
-        Finding::new("improbable_roundness", "/uncertainty/wanted_probability")
-            .measured(joint.probability, joint.wanted, "1")
-            .with("percent", 100.0 * joint.probability)
-            .with("wanted_percent", 100.0 * joint.wanted)
-            .with("at_wanted_um", found.roundness_at_wanted_um)
-    })
+    Some(improbable("improbable_roundness", &found.joint)?.with("at_wanted_um", found.roundness_at_wanted_um))
 }

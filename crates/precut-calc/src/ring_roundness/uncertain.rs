@@ -7,8 +7,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::Violations;
 use crate::certainty::{
-    Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
-    check_correlations, check_presence, check_quantities, normal_below,
+    Block, Contradiction, Distribution, Level, Quantity, Uncertainties, WidthUnit, normal_below, uncertainty_block,
 };
 
 use super::input::Job;
@@ -90,109 +89,32 @@ impl RingQuantity {
     }
 }
 
-/// What is uncertain, and which probability is wanted; acts with the analysis `certainty`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RingUncertainty {
-    /// What is uncertain, in place of what is usual or beside it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 5)]
-    pub quantities: Vec<RingUncertainQuantity>,
-    /// Which of them go together.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    #[schema(max_items = 10, extensions(("x-advanced" = json!(true))))]
-    pub correlations: Vec<RingCorrelation>,
-    /// Whether what is usual is uncertain, too, where nothing is said of it: both angles, compliance ratio, run-out of the
-    /// rollers, the blank.
-    #[serde(default = "yes")]
-    #[schema(default = true, example = true)]
-    pub defaults: bool,
-    /// Probability that the ring is within its tolerance that is wanted; below it the answer warns.
-    #[serde(default = "nineteen_of_twenty")]
-    #[schema(exclusive_minimum = 0.0, exclusive_maximum = 1.0, default = 0.95, example = 0.95, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("P"))))]
-    pub wanted_probability: f64,
-    /// Seed of the points over which probabilities are integrated.
-    #[serde(default = "one")]
-    #[schema(minimum = 0, maximum = 100_000_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("seed"))))]
-    pub seed: u32,
-}
-
-fn yes() -> bool {
-    true
-}
-
-fn nineteen_of_twenty() -> f64 {
-    0.95
-}
-
-fn one() -> u32 {
-    1
-}
-
-impl Default for RingUncertainty {
-    fn default() -> Self {
-        Self {
-            quantities: Vec::new(),
-            correlations: Vec::new(),
-            defaults: yes(),
-            wanted_probability: nineteen_of_twenty(),
-            seed: one(),
-        }
+uncertainty_block! {
+    /// What is uncertain, and which probability is wanted; acts with the analysis `certainty`.
+    RingUncertainty {
+        quantities: RingUncertainQuantity of RingQuantity (max_items = 5), such as "tool_angle";
+        correlations: RingCorrelation (10), such as ["tool_angle", "support_half_angle"];
+        /// Whether what is usual is uncertain, too, where nothing is said of it: both angles, compliance ratio, run-out of the
+        /// rollers, the blank.
+        defaults;
+        /// Probability that the ring is within its tolerance that is wanted; below it the answer warns.
+        wanted_probability;
     }
-}
-
-/// How a quantity is distributed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RingUncertainQuantity {
-    /// Which.
-    #[schema(example = "tool_angle")]
-    pub quantity: RingQuantity,
-    /// How it is distributed about what the job states.
-    pub distribution: Distribution,
-}
-
-/// How two quantities go together.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RingCorrelation {
-    /// Which two.
-    #[schema(min_items = 2, max_items = 2, example = json!(["tool_angle", "support_half_angle"]))]
-    pub between: Vec<RingQuantity>,
-    /// Correlation of their standard normal scores.
-    #[schema(exclusive_minimum = -1.0, exclusive_maximum = 1.0, example = 0.3, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("rho"))))]
-    pub coefficient: f64,
 }
 
 /// All quantities of a checked job that are uncertain, and how they go together.
 pub(super) fn uncertainties(job: &Job) -> Result<Uncertainties<RingQuantity>, Contradiction> {
-    let stated = &job.uncertainty;
+    let block = &job.uncertainty;
     let of = |quantity: RingQuantity| {
-        let own = stated.quantities.iter().find(|one| one.quantity == quantity);
-        let usual = stated.defaults && own.is_none() && quantity.missing_in(job).is_none();
-        let (distribution, source) = match own {
-            Some(own) => (own.distribution.clone(), Source::Stated),
-            None if usual => (quantity.usual(), Source::Default),
-            None => return None,
-        };
-        // One without width is known.
-        let is_wide = (distribution.at(1.0) - distribution.at(-1.0)).abs() > 0.0;
-        is_wide.then_some(Uncertain { quantity, distribution, level: quantity.level(), source })
+        let usual = quantity.missing_in(job).is_none().then(|| quantity.usual());
+        block.uncertain(quantity, quantity.level(), usual)
     };
-    Uncertainties::new(RingQuantity::ALL.into_iter().filter_map(of).collect(), pairs(stated))
-}
-
-fn pairs(stated: &RingUncertainty) -> Vec<Pair<'_, RingQuantity>> {
-    stated.correlations.iter().map(|pair| (&pair.between[..], pair.coefficient)).collect()
+    Uncertainties::new(RingQuantity::ALL.into_iter().filter_map(of).collect(), block.pairs())
 }
 
 /// Finds what cannot be.
 pub(super) fn check(job: &Job, violations: &mut Violations) {
-    let stated = &job.uncertainty;
-    let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
-    check_quantities(&quantities, violations);
-    check_correlations(&pairs(stated), || uncertainties(job).err(), violations);
-    check_presence(stated.quantities.iter().map(|one| one.quantity), |quantity| quantity.missing_in(job), violations);
+    job.uncertainty.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
 }
 
 /// Scores beside those of the quantities: where the blank and where the rollers stand when the ring begins to turn, of which

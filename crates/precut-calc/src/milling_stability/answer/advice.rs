@@ -16,7 +16,7 @@ use super::output::{
     UnstableInterval,
 };
 use super::proposals::effort;
-use super::{Aside, MODEL_ENDS, Study, UM_PER_MM, measured};
+use super::{Aside, MODEL_ENDS, Study, UM_PER_MM, conformance, measured};
 
 /// Above this share of the limit a cut is near to it.
 const NEAR_LIMIT: f64 = 0.9;
@@ -178,6 +178,7 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
     of_spindle(study, outcome, &mut found);
     found.extend(implausible(study));
     found.extend(of_clamping(job, outcome));
+    found.extend(outcome.conformance.as_ref().and_then(conformance::warning));
     if let Some(swing) = aside.beyond_mm {
         let limit = MODEL_ENDS * case.milling.radius_mm;
         found.push(Finding::new("motion_beyond_model", "/cut/depth_mm").measured(swing, limit, "mm"));
@@ -295,6 +296,7 @@ fn implausible(study: &Study<'_>) -> Vec<Finding> {
 
 pub(in crate::milling_stability) fn explanation(study: &Study<'_>, outcome: &Outcome, aside: &Aside) -> Vec<Message> {
     let mut said: Vec<Message> = of_verdict(study, outcome, aside).into_iter().collect();
+    said.extend(outcome.conformance.iter().flat_map(conformance::said));
     if outcome.islands_checked_to_mm.is_some() {
         said.push(match outcome.first_limit_mm {
             Some(limit) if limit > 0.0 => Message::new("chatter_limit_is")

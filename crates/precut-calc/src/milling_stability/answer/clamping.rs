@@ -30,7 +30,7 @@ struct Loads {
 }
 
 /// Whether the work does.
-fn yields(cut: &Cut<'_>) -> bool {
+pub(super) fn yields(cut: &Cut<'_>) -> bool {
     cut.structure.modes.iter().any(|mode| mode.side == Side::Work)
 }
 
@@ -87,9 +87,13 @@ impl Study<'_> {
 
     /// The least clamp force that a cut asks for at the lowest friction, N; `None` where none holds.
     pub(super) fn clamp_asked_n(&self, held: &Held, cut: &Cut<'_>) -> Result<Option<f64>, Failure> {
+        Ok(asked_n(held, &self.loads_of(held, cut)?).ok())
+    }
+
+    /// The loads of a cut over a period at all places.
+    pub(super) fn loads_of(&self, held: &Held, cut: &Cut<'_>) -> Result<Vec<Load>, Failure> {
         let forced = known(self, cut)?;
-        let loads = self.loads(held, &Carried::new(cut, forced.as_ref()))?;
-        Ok(asked_n(held, &loads.all).ok())
+        Ok(self.loads(held, &Carried::new(cut, forced.as_ref()))?.all)
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(super) mod advice;
 mod clamping;
+pub(super) mod conformance;
 mod growth;
 mod lobes;
 mod measured;
@@ -157,7 +158,7 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let (job, case, monitor) = (study.job, &study.case, study.monitor);
     let mut aside = Aside::default();
     monitor.progress(0.02, Message::new("stage_multiplier"));
-    let force = forces(study)?;
+    let force = forces_of(study, &case.milling, case.depth_mm)?;
     let multiplier = if job.asks(Asked::Verdict) { multiplier(study)? } else { None };
     monitor.progress(0.1, Message::new("stage_intervals"));
     let intervals_asked = job.asks(Asked::Intervals);
@@ -220,6 +221,7 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
         speeds: Vec::new(),
         speed_curve: None,
         proposals: Vec::new(),
+        conformance: None,
         cost: MillingCost { oscillations_per_period: case.oscillations(), estimate_ms },
     };
     if job.asks(Asked::Speeds) {
@@ -230,6 +232,10 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     if job.asks(Asked::Proposals) {
         let hz = outcome.multiplier.as_ref().and_then(|multiplier| multiplier.chatter_frequency_hz);
         outcome.proposals = proposals::proposals(study, hz.or(outcome.zeroth_order_frequency_hz))?;
+    }
+    if job.asks(Asked::Certainty) {
+        monitor.progress(0.9, Message::new("stage_certainty"));
+        outcome.conformance = conformance::conformance(study)?;
     }
     Ok((outcome, aside))
 }
@@ -338,9 +344,9 @@ fn engagement(study: &Study<'_>) -> MillingEngagement {
     }
 }
 
-fn forces(study: &Study<'_>) -> Result<MillingForces, Failure> {
+fn forces_of(study: &Study<'_>, milling: &Milling, depth_mm: f64) -> Result<MillingForces, Failure> {
     let case = &study.case;
-    let found = statics(&case.milling, case.depth_mm, study.monitor)?;
+    let found = statics(milling, depth_mm, study.monitor)?;
     let torque = found.torque_mean_n_mm / N_MM_PER_N_M;
     let power = power_kw(torque, case.rotation.spindle_rpm);
     let available = study.job.spindle.as_ref().map(|spindle| spindle.drive().available(case.rotation.spindle_rpm));
@@ -421,22 +427,39 @@ fn depth_line(study: &Study<'_>, seen: &Scan) -> DepthLine {
     DepthLine { depth_mm, per_tooth }
 }
 
+/// Why there is no motion to tell of.
+enum NoMotion {
+    /// None repeats itself.
+    None,
+    /// It swings by so much, which is beyond the model, mm.
+    Beyond(f64),
+}
+
 /// The forced motion; none where there is no periodic one, or it goes beyond the model.
 fn motion(study: &Study<'_>, aside: &mut Aside) -> Result<Option<MillingMotion>, Failure> {
-    let cut = study.cut();
-    let Some(forced) = study.orders.forced(&cut, study.monitor)? else {
-        aside.no_motion = true;
-        return Ok(None);
-    };
+    Ok(match motion_of(study, &study.cut())? {
+        Ok(motion) => Some(motion),
+        Err(NoMotion::None) => {
+            aside.no_motion = true;
+            None
+        }
+        Err(NoMotion::Beyond(swing)) => {
+            aside.beyond_mm = Some(swing);
+            None
+        }
+    })
+}
+
+fn motion_of(study: &Study<'_>, cut: &Cut<'_>) -> Result<Result<MillingMotion, NoMotion>, Failure> {
+    let Some(forced) = study.orders.forced(cut, study.monitor)? else { return Ok(Err(NoMotion::None)) };
     let (low, high) = forced.extremes();
     let swing = forced.swing_mm();
     if swing > MODEL_ENDS * cut.milling.radius_mm || !swing.is_finite() {
-        aside.beyond_mm = Some(swing);
-        return Ok(None);
+        return Ok(Err(NoMotion::Beyond(swing)));
     }
-    let walls = forced.walls().into_iter().map(|wall| surface(&forced, wall, study.case.depth_mm)).collect();
+    let walls = forced.walls().into_iter().map(|wall| surface(&forced, wall, cut.depth_mm)).collect();
     let um = |mm: f64| mm * UM_PER_MM;
-    Ok(Some(MillingMotion {
+    Ok(Ok(MillingMotion {
         x_min_um: um(low[0]),
         x_max_um: um(high[0]),
         y_min_um: um(low[1]),

@@ -6,6 +6,7 @@ use utoipa::ToSchema;
 use crate::receptance_fit::{Direction, FittedFunction, FittedGroup, ModeCertainty};
 
 use super::super::model;
+use super::conformance::MillingConformance;
 
 /// Whether the cut holds still, and what it does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -64,6 +65,9 @@ pub struct Outcome {
     pub speed_curve: Option<SpeedCurve>,
     /// Other cutters and a varying speed that would remove at least 5 % more at this speed, each solved; only with the analysis `proposals`.
     pub proposals: Vec<CutterProposal>,
+    /// How probable it is that the cut stays quiet and every limit is kept; only with the analysis `certainty`, and null where nothing
+    /// is uncertain.
+    pub conformance: Option<MillingConformance>,
     /// How much there was to compute.
     pub cost: MillingCost,
 }

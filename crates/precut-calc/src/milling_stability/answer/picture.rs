@@ -3,15 +3,42 @@
 use std::borrow::Cow;
 
 use crate::calculator::{Axis, Cells, Column, Figure, Frame, Item, Message, Panel, Place, Role, Said, Setting, Table};
+use crate::certainty::picture as doubt;
 
 use super::super::job::{Job, PartClamping};
 use super::output::{
     ForceOfSide, LobeIntervals, MillingBoundary, MillingLobes, MillingMap, Outcome, SpeedCurve, SpeedPocket, WallSide,
 };
 
-pub(in crate::milling_stability) const FIGURE_IDS: &[&str] = &["lobes", "speeds", "depth_line", "surface", "clamping"];
-pub(in crate::milling_stability) const TABLE_IDS: &[&str] =
-    &["lobes", "intervals", "lobe_intervals", "map", "speeds", "speed_curve", "modes", "force", "surface", "contacts"];
+pub(in crate::milling_stability) const FIGURE_IDS: &[&str] =
+    &["lobes", "speeds", "depth_line", "surface", "clamping", doubt::ID];
+pub(in crate::milling_stability) const TABLE_IDS: &[&str] = &[
+    "lobes",
+    "intervals",
+    "lobe_intervals",
+    "map",
+    "speeds",
+    "speed_curve",
+    "modes",
+    "force",
+    "surface",
+    "contacts",
+    doubt::ID,
+];
+
+/// Codes of what may be doubted, in the picture of the doubt.
+pub(in crate::milling_stability) const DOUBT_LABELS: &[&str] = &[
+    "doubt_tool_mode_frequency",
+    "doubt_tool_mode_stiffness",
+    "doubt_tool_mode_damping",
+    "doubt_work_mode_frequency",
+    "doubt_work_mode_stiffness",
+    "doubt_work_mode_damping",
+    "doubt_cutting_force",
+    "doubt_runout",
+    "doubt_clamp_force",
+    "doubt_friction",
+];
 
 /// Codes that the figures utter.
 pub(in crate::milling_stability) const LABEL_CODES: &[&str] = &[
@@ -77,6 +104,8 @@ pub(in crate::milling_stability) fn figures(job: &Job, outcome: &Outcome) -> Vec
     figures.extend(depth_line(job, outcome));
     figures.extend(surface(job, outcome));
     figures.extend(clamping(job, outcome));
+    let sure = outcome.conformance.as_ref();
+    figures.extend(sure.and_then(|sure| doubt::figure(&sure.contributions, &sure.joint, DOUBT_LABELS)));
     figures
 }
 
@@ -295,6 +324,7 @@ pub(in crate::milling_stability) fn tables(outcome: &Outcome) -> Vec<Table> {
         force(outcome),
         wall_table(outcome),
         contacts(outcome),
+        doubt::table(outcome.conformance.as_ref().map_or(&[], |sure| &sure.contributions)),
     ]
 }
 

@@ -10,6 +10,7 @@ use crate::receptance_fit::{Function, check_at};
 use super::super::model::{MOST_OSCILLATIONS, Rotation, Vector};
 use super::case::{Case, arc_rad, coefficient, direction, in_the_cut, milling, numbers, range_rpm, varying};
 use super::input::{Asked, Cut, EdgeForce, Job, Yielding, YieldingMode};
+use super::uncertain::clamped;
 
 /// Codes of the faults found here, and those that fields name for their range.
 pub(in crate::milling_stability) const CODES: &[&str] = &[
@@ -47,6 +48,7 @@ pub(in crate::milling_stability) const CODES: &[&str] = &[
     "speeds_reversed",
     "spindle_row_without_limit",
     "spindle_speeds_unordered",
+    "certainty_of_nothing",
 ];
 
 /// S and S_z that both are given may differ by so much.
@@ -67,6 +69,7 @@ impl Check for Job {
         check_clamping(self, violations);
         check_force(self, &measured, violations);
         check_spindle(self, violations);
+        check_certainty(self, violations);
         check_cost(self, violations);
     }
 }
@@ -306,6 +309,19 @@ fn check_spindle(job: &Job, violations: &mut Violations) {
     }
 }
 
+fn check_certainty(job: &Job, violations: &mut Violations) {
+    super::uncertain::check(job, violations);
+    let limits = &job.limits;
+    let of_surface = [limits.amplitude_max_um, limits.surface_error_max_um, limits.roughness_max_um];
+    let is_rigid = job.sides().iter().all(|(.., yielding)| matches!(yielding, Yielding::Rigid(_)));
+    let is_driven = job.spindle.as_ref().zip(job.spindle_rpm()).is_some_and(|(spindle, rpm)| {
+        let available = spindle.drive().available(rpm);
+        available.power_kw.is_some() || available.torque_n_m.is_some()
+    });
+    let has_limit = !is_rigid || is_driven || clamped(job).is_some() || of_surface.iter().any(Option::is_some);
+    violations.require(!job.asks(Asked::Certainty) || has_limit, || Finding::new("certainty_of_nothing", "/analyses"));
+}
+
 /// A multiplier over thousands of oscillations is refused; a lobe diagram leaves such speeds out. Of a slow cut closed forms tell what
 /// is asked, but no other cutter is tried. Of a measured side it is known only when its modes are.
 fn check_cost(job: &Job, violations: &mut Violations) {
@@ -316,8 +332,9 @@ fn check_cost(job: &Job, violations: &mut Violations) {
 
 /// What is too dear at the working speed.
 pub(in crate::milling_stability) fn too_expensive(job: &Job, case: &Case) -> Option<Finding> {
-    let at_speed =
-        [Asked::Verdict, Asked::Intervals, Asked::Motion, Asked::Proposals].into_iter().any(|what| job.asks(what));
+    let at_speed = [Asked::Verdict, Asked::Intervals, Asked::Motion, Asked::Proposals, Asked::Certainty]
+        .into_iter()
+        .any(|what| job.asks(what));
     let oscillations = case.oscillations();
     let is_told = case.cut().is_slow() && !job.asks(Asked::Proposals);
     if !at_speed || is_told || oscillations <= MOST_OSCILLATIONS {

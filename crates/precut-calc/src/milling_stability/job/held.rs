@@ -198,6 +198,12 @@ impl PartClamping {
         of_vise.or_else(of_contacts)
     }
 
+    /// Whether a cylinder presses at every clamp, else a hand turns a screw.
+    pub(super) fn is_set_by_pressure(&self) -> bool {
+        let mut clamps = self.contacts.iter().flat_map(|of| &of.points).filter(|point| point.clamp_share > 0.0);
+        self.vise.as_ref().map_or_else(|| clamps.all(|point| point.constant_force), |vise| vise.constant_force)
+    }
+
     /// Contacts and weight; `None` of a job that is refused.
     fn fixture(&self) -> Option<Fixture> {
         let weight_n = GRAVITY * self.part_mass_kg;

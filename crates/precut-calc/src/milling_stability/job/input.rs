@@ -11,6 +11,7 @@ use crate::receptance_fit::{Job as FitJob, ReceptanceFile, Residuals};
 
 use super::super::model::Side;
 use super::held::PartClamping;
+use super::uncertain::MillingUncertainty;
 
 /// A cutter in a cut, what yields of tool and workpiece, and what is to be known before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -48,9 +49,13 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
     pub speed_variation: Option<SpeedVariation>,
+    /// What is uncertain in it, and which probability is wanted; acts with the analysis `certainty`.
+    #[serde(default)]
+    #[schema(extensions(("x-group" = json!("cut"))))]
+    pub uncertainty: MillingUncertainty,
     /// What is asked. Force, torque and power and the zeroth order are always told.
     #[serde(default = "usual_analyses")]
-    #[schema(max_items = 7, default = json!(["verdict", "intervals"]), example = json!(["verdict", "intervals", "lobes"]), extensions(("x-group" = json!("numerics"))))]
+    #[schema(max_items = 8, default = json!(["verdict", "intervals"]), example = json!(["verdict", "intervals", "lobes"]), extensions(("x-group" = json!("numerics"))))]
     pub analyses: Vec<Asked>,
     /// What must be kept, and how deep is looked.
     #[serde(default)]
@@ -598,6 +603,9 @@ pub enum Asked {
     Speeds,
     /// Other pitches, another helix, a varying speed, each tried at the working speed.
     Proposals,
+    /// How probable it is that the cut stays quiet and every limit is kept, what makes that uncertain, and how deep one may cut with the
+    /// wanted probability.
+    Certainty,
 }
 
 /// What must be kept, and how deep is looked.

@@ -5,6 +5,7 @@ mod check;
 mod held;
 mod input;
 mod measured;
+mod uncertain;
 
 pub(super) use case::{Case, range_rpm, varying};
 pub(super) use check::{CODES, modes, too_expensive, way};
@@ -16,3 +17,5 @@ pub use input::{
     ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 pub(super) use measured::{Fit, fits, guessed};
+pub(super) use uncertain::{Drawn, OneQuantity, clamped, drawn, uncertainties};
+pub use uncertain::{MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty};

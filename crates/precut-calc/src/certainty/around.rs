@@ -1,0 +1,193 @@
+//! How probable it is that several limits are kept, where all quantities are factors: a response surface about the stated values,
+//! lines through it, and the real model on some of them (`certainty/3.2`).
+
+use crate::calculator::{Failure, Monitor};
+
+use super::lines::{Effort, Found, Margins, Question, Together};
+use super::{Contribution, Quantity, Surface, Uncertain, Uncertainties, bounded};
+
+/// A margin beyond this, of a logarithm, is as good as without end.
+const FAR: f64 = 50.0;
+
+/// A margin as it may be counted with.
+pub(crate) fn far(margin: f64) -> f64 {
+    margin.clamp(-FAR, FAR)
+}
+
+/// The real model: by how much limits are kept, as logarithms, at what quantities come to.
+pub(crate) type Real<'a, const K: usize> = dyn Fn(&[f64]) -> Result<Margins<K>, Failure> + 'a;
+
+/// What is uncertain, and of what limits the probability is asked.
+pub(crate) struct Asked<'a, Q, const K: usize, const S: usize> {
+    pub uncertainties: &'a Uncertainties<Q>,
+    /// Which of the limits there are.
+    pub limits: &'a [usize],
+    /// Sets of limits of which the probability is asked; the last one is all.
+    pub sets: [Together; S],
+    pub seed: u32,
+    /// Most lines of one scrambling: of the response surface, and of the real model.
+    pub most_lines: [usize; 2],
+    pub monitor: &'a dyn Monitor,
+    pub real: &'a Real<'a, K>,
+}
+
+/// The same with a response surface about the stated values.
+pub(crate) struct Around<'a, Q, const K: usize, const S: usize> {
+    asked: Asked<'a, Q, K, S>,
+    surface: Surface,
+    /// Standard deviation of the logarithm of every quantity.
+    scales: Vec<f64>,
+    /// Change of every limit with every independent score.
+    slopes: Vec<Vec<f64>>,
+    /// How far away the limits are by them, in standard deviations.
+    distances: Vec<f64>,
+    /// Along which limits change together, each as much as it is near.
+    axis: Vec<f64>,
+}
+
+impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
+    /// At least one quantity is uncertain.
+    pub(crate) fn of(asked: Asked<'a, Q, K, S>) -> Result<Self, Failure> {
+        let scale = |one: &Uncertain<Q>| 0.5 * (one.distribution.at(1.0) / one.distribution.at(-1.0)).ln();
+        let scales: Vec<f64> = asked.uncertainties.of.iter().map(scale).collect();
+        let medians: Vec<f64> = asked.uncertainties.of.iter().map(|one| one.distribution.at(0.0)).collect();
+        let surface = Surface::of(&vec![true; scales.len()], &mut |x| {
+            let factor = |i: usize| medians[i] * (scales[i] * x[i]).exp();
+            let margins = asked.tried(&(0..x.len()).map(factor).collect::<Vec<_>>())?;
+            Ok(asked.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())
+        })?;
+        let mut around = Self { asked, surface, scales, slopes: Vec::new(), distances: Vec::new(), axis: Vec::new() };
+        around.set_slopes();
+        Ok(around)
+    }
+
+    /// Margins by the response surface; infinite where there is no limit.
+    fn near(&self, of: &Uncertainties<Q>, independent: &[f64], is_bent: bool) -> Margins<K> {
+        let medians = self.asked.uncertainties.of.iter().map(|one| one.distribution.at(0.0));
+        let values = of.values(independent);
+        let x: Vec<f64> = values
+            .iter()
+            .zip(medians)
+            .zip(&self.scales)
+            .map(|((value, median), scale)| (value / median).ln() / scale)
+            .collect();
+        let found = if is_bent { self.surface.at(&x) } else { self.surface.linear_at(&x) };
+        let mut margins = [f64::INFINITY; K];
+        self.asked.limits.iter().zip(found).for_each(|(&limit, margin)| margins[limit] = margin);
+        margins
+    }
+
+    /// Sets how the limits change with independent scores, and how far away they are by that.
+    fn set_slopes(&mut self) {
+        let count = self.scales.len();
+        let uncertainties = self.asked.uncertainties;
+        let change = |index: usize, limit: usize| {
+            let at = |score: f64| {
+                let mut independent = vec![0.0; count];
+                independent[index] = score;
+                self.near(uncertainties, &independent, true)[limit]
+            };
+            at(0.5) - at(-0.5)
+        };
+        let slopes: Vec<Vec<f64>> =
+            self.asked.limits.iter().map(|&limit| (0..count).map(|index| change(index, limit)).collect()).collect();
+        let lengths: Vec<f64> =
+            slopes.iter().map(|of| of.iter().map(|s| s * s).sum::<f64>().sqrt().max(1e-12)).collect();
+        let distances: Vec<f64> =
+            self.surface.at_point().iter().zip(&lengths).map(|(margin, length)| margin / length).collect();
+        let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        // A limit that lies across the lines would leave a step from line to line; one that is far away does not matter.
+        let weight = |limit: usize| {
+            let beyond = distances[limit] - nearest.max(0.0);
+            (-0.5 * beyond * beyond).exp() / lengths[limit]
+        };
+        let along = |index: usize| (0..slopes.len()).map(|limit| weight(limit) * slopes[limit][index]).sum();
+        self.axis = (0..count).map(along).collect();
+        (self.slopes, self.distances) = (slopes, distances);
+    }
+
+    fn question(&self, most_lines: usize) -> Question<'_, S> {
+        let effort = Effort { seed: self.asked.seed, most_lines };
+        Question { axis: &self.axis, sets: self.asked.sets.clone(), effort, monitor: self.asked.monitor }
+    }
+
+    /// The probability of every set; that of a single limit is no less than that of all, which decides how far to go.
+    pub(crate) fn found(&self) -> Result<Found<S>, Failure> {
+        let of = self.asked.uncertainties;
+        let [most, most_real] = self.asked.most_lines;
+        let mut real = |g: &[f64]| self.asked.tried(&of.values(g));
+        let near = &mut |g: &[f64]| Ok(self.near(of, g, true));
+        let mut found = self.question(most).of_real(most_real, &mut real, near)?;
+        let all = found.of[S - 1].probability;
+        found.of.iter_mut().for_each(|of| of.probability = of.probability.max(all));
+        Ok(found)
+    }
+
+    /// The probability of all limits by a straight model.
+    pub(crate) fn linear_probability(&self) -> Result<f64, Failure> {
+        let of = self.asked.uncertainties;
+        let mut near = |g: &[f64]| Ok(self.near(of, g, false));
+        Ok(self.question(self.asked.most_lines[0]).of(&mut near)?.of[S - 1].probability)
+    }
+
+    /// The probability of all limits by the real model alone, on so many lines of a scrambling.
+    fn on_few(&self, of: &Uncertainties<Q>, lines: usize) -> Result<f64, Failure> {
+        let mut real = |g: &[f64]| self.asked.tried(&of.values(g));
+        Ok(self.question(lines).of(&mut real)?.of[S - 1].probability)
+    }
+
+    /// The limit that fails most often, of those that fail as often the nearest.
+    fn failing(&self, found: &Found<S>) -> usize {
+        let probability = |place: usize| found.of[self.asked.limits[place]].probability;
+        let order = |a: &usize, b: &usize| {
+            probability(*a).total_cmp(&probability(*b)).then(self.distances[*a].total_cmp(&self.distances[*b]))
+        };
+        (0..self.slopes.len()).min_by(order).unwrap_or(0)
+    }
+
+    /// What the doubt is made of in the limit that fails most often, quantities of one name together; where `lines` of a scrambling are given, what half of a width
+    /// makes of it: by how much the models differ from those of the whole width on the same few lines.
+    pub(crate) fn contributions(&self, found: &Found<S>, lines: Option<usize>) -> Result<Vec<Contribution>, Failure> {
+        let of = self.asked.uncertainties;
+        let probability = found.of[S - 1].probability;
+        let slopes = &self.slopes[self.failing(found)];
+        let variance: f64 = slopes.iter().map(|s| s * s).sum();
+        let now = lines.map(|lines| self.on_few(of, lines)).transpose()?;
+        let mut all: Vec<Contribution> = Vec::new();
+        for one in &of.of {
+            let name = one.quantity.name();
+            if all.iter().any(|told| told.quantity == name) {
+                continue;
+            }
+            let own: Vec<usize> = (0..of.of.len()).filter(|&index| of.of[index].quantity.name() == name).collect();
+            let of_own: f64 = own.iter().map(|&index| slopes[index] * slopes[index]).sum();
+            let share = if variance > 0.0 { of_own / variance } else { 0.0 };
+            let halved = match lines.zip(now) {
+                Some((lines, now)) => {
+                    let halved = own.iter().fold(of.clone(), |of, &index| of.halved(index));
+                    Some(bounded(probability + self.on_few(&halved, lines)? - now))
+                }
+                None => None,
+            };
+            all.push(Contribution {
+                quantity: name.to_owned(),
+                source: one.source,
+                level: one.level,
+                share_of_variance: of.scores.is_independent().then_some(share),
+                joint_probability_if_halved: halved,
+            });
+        }
+        Contribution::sort(&mut all);
+        Ok(all)
+    }
+}
+
+impl<Q, const K: usize, const S: usize> Asked<'_, Q, K, S> {
+    /// Margins at what quantities come to; where there is no answer none is kept.
+    fn tried(&self, values: &[f64]) -> Result<Margins<K>, Failure> {
+        match (self.real)(values) {
+            Err(Failure::OutOfModel(_) | Failure::NotConverged { .. }) => Ok([f64::NEG_INFINITY; K]),
+            found => found,
+        }
+    }
+}
