@@ -51,7 +51,7 @@ pub(in crate::diagnosis) fn answer<M: Diagnosable>(
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers(monitor)?;
-    foundation.far_rows.clone_from(&found.far_rows);
+    foundation.structure.clone_from(&found.structure);
     if job.options.leave_outliers_out {
         foundation.heavy_tails.clone_from(&found.heavy_tails);
     }

@@ -11,6 +11,8 @@ const SUSPECT: f64 = 4.5;
 const AT_PEACE: f64 = 3.0;
 /// 1 / Phi^-1(3/4): makes the median absolute deviation a standard deviation of Gaussian scatter.
 const MAD_TO_SD: f64 = 1.482_602_218_505_602;
+/// So many far rows side by side are no chance.
+const SIDE_BY_SIDE: usize = 3;
 /// More flagged rows than one in so many are no outliers but heavy tails.
 const ONE_IN: usize = 20;
 
@@ -28,6 +30,9 @@ pub struct Outliers {
     /// Rows along sweeps that lie as far away and stay: nothing tells whether they are blunders side by side or belong to a
     /// narrow structure. Ascending; none where there are too many outliers.
     pub far_rows: Vec<usize>,
+    /// Those of them that the part has for certain: several side by side, or shown by other sweeps, too. What they are off is no
+    /// scatter.
+    pub structure: Vec<usize>,
 }
 
 impl Outliers {
@@ -106,13 +111,28 @@ pub(crate) fn outliers(
         fit.structure.fill(false);
         if flagged.len() > most {
             let heavy_tails = ordered.then(|| heavy_tails(&traces, residual.len()));
-            return Ok(Outliers { rows: flagged, too_many: true, heavy_tails, far_rows: Vec::new() });
+            return Ok(Outliers { rows: flagged, too_many: true, heavy_tails, ..Outliers::default() });
         }
     };
-    let far = traces.iter().filter(|_| ordered).flat_map(|fit| fit.far_structure(SUSPECT * spread));
-    let mut far_rows: Vec<usize> = far.collect();
-    far_rows.sort_unstable();
-    Ok(Outliers { rows: flagged, too_many: false, heavy_tails: None, far_rows })
+    let mut found = Outliers { rows: flagged, ..Outliers::default() };
+    for (trace, fit) in traces.iter().enumerate().filter(|_| ordered) {
+        let far = fit.far_structure(SUSPECT * spread);
+        for &place in &far {
+            found.far_rows.push(fit.rows[place]);
+            if in_a_row(&far, place) || is_shown_elsewhere(&traces, &data.layout.design.smooth, trace, place, spread) {
+                found.structure.push(fit.rows[place]);
+            }
+        }
+    }
+    found.far_rows.sort_unstable();
+    Ok(found)
+}
+
+/// Whether a place is one of so many side by side that chance, however heavy its tails, does not put there.
+fn in_a_row(far: &[usize], place: usize) -> bool {
+    let before = (1..SIDE_BY_SIDE).take_while(|by| place >= *by && far.contains(&(place - by))).count();
+    let after = (1..SIDE_BY_SIDE).take_while(|by| far.contains(&(place + by))).count();
+    before + after + 1 >= SIDE_BY_SIDE
 }
 
 /// Whether at least half of the other sweeps that have a row there, within half of the way to the next one, are as far away on
@@ -261,11 +281,9 @@ impl Fit {
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Rows that were looked at, are part of a structure, and lie farther away than this.
-    fn far_structure(&self, from: f64) -> impl Iterator<Item = usize> + '_ {
-        (0..self.rows.len())
-            .filter(move |&place| self.structure[place] && self.t[place].abs() >= from)
-            .map(|place| self.rows[place])
+    /// Places of rows that were looked at, are part of a structure, and lie farther away than this, ascending.
+    fn far_structure(&self, from: f64) -> Vec<usize> {
+        (0..self.rows.len()).filter(|&place| self.structure[place] && self.t[place].abs() >= from).collect()
     }
 
     /// Whether, with this row out, its neighbours in measuring order fit. Of rows without an order: whether no repeat lies

@@ -21,8 +21,8 @@ pub struct Foundation<'a> {
     pub residual: Vec<f64>,
     /// Standard deviation of every row, where the scatter has heavy tails.
     pub heavy_tails: Option<Vec<f64>>,
-    /// Rows that belong to a narrow structure: what they are off is no scatter.
-    pub far_rows: Vec<usize>,
+    /// Rows that belong to a narrow structure for certain: what they are off is no scatter.
+    pub structure: Vec<usize>,
     pub(in crate::diagnosis) signatures: Signatures,
     /// One standard deviation of every allowance; most act in one run only.
     pub(in crate::diagnosis) nuisances: Vec<Sparse>,
@@ -54,7 +54,7 @@ impl<'a> Foundation<'a> {
             predicted,
             residual,
             heavy_tails: None,
-            far_rows: Vec::new(),
+            structure: Vec::new(),
             signatures,
             nuisances,
             allowed,
@@ -80,7 +80,7 @@ impl<'a> Foundation<'a> {
     /// Of the rows that are kept, those that tell of the scatter.
     pub(in crate::diagnosis) fn scattering(&self, keep: &[bool]) -> Vec<bool> {
         let mut scattering = keep.to_vec();
-        self.far_rows.iter().for_each(|&row| scattering[row] = false);
+        self.structure.iter().for_each(|&row| scattering[row] = false);
         scattering
     }
 
