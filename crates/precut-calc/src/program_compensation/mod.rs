@@ -108,8 +108,9 @@ impl Calculator for ProgramCompensation {
         let turned_ms = if job.stock.is_some() { 2e-2 * lines as f64 } else { 0.0 };
         // Where the work yields, every move bends a beam of its own.
         let yielding_ms = if job.force.is_some() { made::drive_ms_of(job) } else { 0.0 };
-        // A correction drives it again as it should come out, and what comes of it once or a few times.
-        let drives = if job.mode.kind.compensates() { 3.0 } else { 1.0 };
+        // A correction drives it again as it should come out, and what comes of it, from its first line of the contour on: a few times
+        // little, or once most of it (measured).
+        let drives = if job.mode.kind.compensates() { 2.0 } else { 1.0 };
         // New feeds drive it until the schedule and what comes out at its feeds are one.
         let drives = if job.mode.kind.refeeds() { drives + 10.0 } else { drives };
         // How sure the parts are takes drives of its own: for a response surface, and on lines through what is uncertain.
