@@ -255,7 +255,7 @@ fn answered(job: &Value) -> Option<f64> {
     match solve(job.clone()) {
         Ok(outcome) => Some(outcome.objective),
         Err(Failure::OutOfModel(_) | Failure::Conflicting(_)) => None,
-        Err(failure) => panic!("{failure:?}"),
+        Err(failure) => panic!("{failure:?}: {job}"),
     }
 }
 

@@ -39,7 +39,8 @@ pub(crate) struct Around<'a, Q, const K: usize, const S: usize> {
     scales: Vec<f64>,
     /// Change of every limit with every independent score.
     slopes: Vec<Vec<f64>>,
-    deciding: usize,
+    /// How far away the limits are by them, in standard deviations.
+    distances: Vec<f64>,
     /// Along which limits change together, each as much as it is near.
     axis: Vec<f64>,
 }
@@ -55,7 +56,7 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
             let margins = asked.tried(&(0..x.len()).map(factor).collect::<Vec<_>>())?;
             Ok(asked.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())
         })?;
-        let mut around = Self { asked, surface, scales, slopes: Vec::new(), deciding: 0, axis: Vec::new() };
+        let mut around = Self { asked, surface, scales, slopes: Vec::new(), distances: Vec::new(), axis: Vec::new() };
         around.set_slopes();
         Ok(around)
     }
@@ -76,7 +77,7 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         margins
     }
 
-    /// Sets how the limits change with independent scores, and which is nearest by them.
+    /// Sets how the limits change with independent scores, and how far away they are by that.
     fn set_slopes(&mut self) {
         let count = self.scales.len();
         let uncertainties = self.asked.uncertainties;
@@ -94,15 +95,15 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
             slopes.iter().map(|of| of.iter().map(|s| s * s).sum::<f64>().sqrt().max(1e-12)).collect();
         let distances: Vec<f64> =
             self.surface.at_point().iter().zip(&lengths).map(|(margin, length)| margin / length).collect();
-        self.deciding = (0..distances.len()).min_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+        let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
         // A limit that lies across the lines would leave a step from line to line; one that is far away does not matter.
         let weight = |limit: usize| {
-            let beyond = distances[limit] - distances[self.deciding].max(0.0);
+            let beyond = distances[limit] - nearest.max(0.0);
             (-0.5 * beyond * beyond).exp() / lengths[limit]
         };
         let along = |index: usize| (0..slopes.len()).map(|limit| weight(limit) * slopes[limit][index]).sum();
         self.axis = (0..count).map(along).collect();
-        self.slopes = slopes;
+        (self.slopes, self.distances) = (slopes, distances);
     }
 
     fn question(&self, most_lines: usize) -> Question<'_, S> {
@@ -135,11 +136,21 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         Ok(self.question(lines).of(&mut real)?.of[S - 1].probability)
     }
 
-    /// What the doubt is made of, quantities of one name together; where `lines` of a scrambling are given, what half of a width
+    /// The limit that fails most often, of those that fail as often the nearest.
+    fn failing(&self, found: &Found<S>) -> usize {
+        let probability = |place: usize| found.of[self.asked.limits[place]].probability;
+        let order = |a: &usize, b: &usize| {
+            probability(*a).total_cmp(&probability(*b)).then(self.distances[*a].total_cmp(&self.distances[*b]))
+        };
+        (0..self.slopes.len()).min_by(order).unwrap_or(0)
+    }
+
+    /// What the doubt is made of in the limit that fails most often, quantities of one name together; where `lines` of a scrambling are given, what half of a width
     /// makes of it: by how much the models differ from those of the whole width on the same few lines.
-    pub(crate) fn contributions(&self, probability: f64, lines: Option<usize>) -> Result<Vec<Contribution>, Failure> {
+    pub(crate) fn contributions(&self, found: &Found<S>, lines: Option<usize>) -> Result<Vec<Contribution>, Failure> {
         let of = self.asked.uncertainties;
-        let slopes = &self.slopes[self.deciding];
+        let probability = found.of[S - 1].probability;
+        let slopes = &self.slopes[self.failing(found)];
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
         let now = lines.map(|lines| self.on_few(of, lines)).transpose()?;
         let mut all: Vec<Contribution> = Vec::new();

@@ -141,7 +141,7 @@ impl<'a> Judged<'a> {
         Ok(FixtureConformance {
             limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
             joint: JointlyKept::of(found.of[ALL], wanted),
-            contributions: around.contributions(found.of[ALL].probability, compared)?,
+            contributions: around.contributions(&found, compared)?,
             depth_at_wanted_mm: match deepest_mm {
                 Some(deepest_mm) => self.depth_mm(self.case.working, wanted, deepest_mm)?,
                 None => None,

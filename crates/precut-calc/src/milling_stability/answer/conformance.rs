@@ -48,15 +48,15 @@ const SETS: [Together; LIMITS + 1] = [
 ];
 const ALL: usize = LIMITS;
 /// Most lines of one scrambling: of the response surface, and of cuts; fewer of a depth that is tried on the way to the wanted one.
-const MOST_LINES: [usize; 2] = [64, 16];
+const MOST_LINES: [usize; 2] = [128, 32];
 const MOST_LINES_TRIED: [usize; 2] = [64, 4];
 /// Lines of one scrambling on which cuts are compared.
-const COMPARED_LINES: usize = 2;
+const COMPARED_LINES: usize = 4;
 /// Draws of the real model that an answer takes, roughly: lines of the answer itself, of a depth that is tried, and of a quantity of
 /// half a width.
-const DRAWS: f64 = 1500.0;
+const DRAWS: f64 = 3000.0;
 const DRAWS_TRIED: f64 = 500.0;
-const DRAWS_COMPARED: f64 = 300.0;
+const DRAWS_COMPARED: f64 = 600.0;
 const DEPTHS_TRIED: f64 = 6.0;
 
 /// Codes of what is said here.
@@ -105,7 +105,7 @@ pub(super) fn conformance(study: &Study<'_>) -> Result<Option<MillingConformance
     Ok(Some(MillingConformance {
         limits: judged.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
         joint: JointlyKept::of(found.of[ALL], wanted),
-        contributions: around.contributions(found.of[ALL].probability, Some(COMPARED_LINES))?,
+        contributions: around.contributions(&found, Some(COMPARED_LINES))?,
         depth_at_wanted_mm: deepest_mm(study.case.depth_mm, study.examined_mm, wanted, &mut { probability })?,
         method: ConformanceMethod {
             integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
