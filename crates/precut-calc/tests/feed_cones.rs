@@ -6,11 +6,12 @@ use std::f64::consts::{PI, SQRT_2};
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use precut_calc::calculator::Failure;
+use precut_calc::calculator::{Calculator, Failure, Unwatched};
+use precut_calc::feed_schedule::FeedSchedule;
 use serde_json::{Value, json};
 
 use crate::draw::Draw;
-use crate::feed_support::solve;
+use crate::feed_support::{self, solve};
 
 /// An affine form of the variables.
 #[derive(Clone, Default)]
@@ -262,7 +263,7 @@ fn answered(job: &Value) -> Option<f64> {
 #[test]
 fn schedules_at_a_risk_are_those_of_a_program_on_cones() {
     let count: u32 =
-        std::env::var("PRECUT_CERTAINTY_SCHEDULES").ok().and_then(|count| count.parse().ok()).unwrap_or(25);
+        std::env::var("PRECUT_CERTAINTY_SCHEDULES").ok().and_then(|count| count.parse().ok()).unwrap_or(40);
     let mut draw = Draw::new(41);
     let (mut furthest, mut refused) = ([0.0_f64; 3], [0; 3]);
     for index in 0..count {
@@ -290,4 +291,40 @@ fn schedules_at_a_risk_are_those_of_a_program_on_cones() {
     }
     eprintln!("{count} schedules: furthest from each other {furthest:?}, refused by both {refused:?}");
     assert!(refused.iter().all(|refused| *refused < count), "{refused:?}");
+}
+
+/// Tangents from schedule to schedule go round in circles where no schedule keeps the risk: all of them together tell it.
+#[test]
+fn a_risk_that_cannot_be_had_is_told_where_linearisations_do_not_settle() {
+    let job = json!({
+        "zones": [{ "id": "z", "z_start_mm": 0, "z_end_mm": 60.2815, "diameter_mm": 46.0402, "depth_mm": 0.940_173,
+            "roughness_max_um": 2.54654, "compliance_um_per_n": 0.061_856_3, "deflection_max_um": 16.7368 }],
+        "models": {
+            "roughness": { "constant": 4.52809, "speed_exponent": -0.067_647, "feed_exponent": 1.32565, "residual_scatter": 0.256_241,
+                "coefficient_covariance": { "order": ["constant", "speed_exponent", "feed_exponent"], "matrix": [
+                    [1.329_953_88, -0.260_245_45, 0.036_014_29], [-0.260_245_45, 0.053_848_745, 0.0], [0.036_014_29, 0.0, 0.019_433_270_4]] } },
+            "tool_life": { "constant": 20.3322, "speed_exponent": -3.608, "feed_exponent": -1.46988, "residual_scatter": 0.156_148 },
+            "force_y": { "constant": 7.14569, "feed_exponent": 0.420_111, "depth_exponent": 0.884_701, "speed_exponent": -0.247_616,
+                "residual_scatter": 0.125_840 }
+        },
+        "limits": { "feed_min_mm_per_rev": 0.05, "feed_max_mm_per_rev": 0.520_513, "speed_min_m_per_min": 60,
+            "speed_max_m_per_min": 223.331, "tool_usage_max": 0.664_865 },
+        "objective": { "kind": "cost", "machine_rate_per_min": 0.998_571, "tool_change_time_min": 0.532_966, "edge_cost": 6.83687 },
+        "risk": { "kind": "each", "risk_percent": 0.229_037, "edge_risk_percent": 1.34642 }
+    });
+    assert!(each(&job, 0.002_290_37).is_none());
+    let Err(Failure::OutOfModel(finding)) = FeedSchedule::run(&feed_support::job(job.clone()), &Unwatched) else {
+        panic!("no schedule keeps that risk");
+    };
+    assert_eq!(finding.code, "infeasible_at_this_risk");
+    // What is advised is done, and is the least by the cones, too.
+    let least = finding.limit.unwrap();
+    let at = |percent: f64| {
+        let mut job = job.clone();
+        job["risk"]["risk_percent"] = json!(percent);
+        job
+    };
+    let (found, expected) = (answered(&at(1.001 * least)), each(&at(1.001 * least), 0.01 * 1.001 * least));
+    assert!((found.unwrap() / expected.unwrap() - 1.0).abs() < 2e-6, "{found:?} {expected:?}");
+    assert!(answered(&at(0.999 * least)).is_none() && each(&at(0.999 * least), 0.01 * 0.999 * least).is_none());
 }

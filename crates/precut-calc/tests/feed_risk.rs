@@ -166,6 +166,17 @@ fn what_the_warning_of_failures_tells_ends_them() {
     assert!(codes(&job).contains(&"no_scatter_given"));
 }
 
+/// Edges have a risk of their own beside a joint one: what they may be used is moved in where it binds, too.
+#[test]
+fn a_joint_risk_leaves_edges_their_own() {
+    let mut job = case("f2-joint-one-percent")["job"].clone();
+    let most = 0.7 * number(&solved(&job), "/tool_usage");
+    job["limits"]["tool_usage_max"] = json!(most);
+    // Quantile of the standard normal distribution at 2 %.
+    let allowed = most * (-2.053_748_910_631_823 * number(&job, "/models/tool_life/residual_scatter")).exp();
+    near("usage", number(&solved(&job), "/tool_usage"), allowed, 1e-6);
+}
+
 #[test]
 fn a_joint_risk_costs_no_more_than_the_same_shared_evenly() {
     let job = case("f2-joint-one-percent")["job"].clone();

@@ -211,7 +211,7 @@ fn after_a_change_parts_are_good_again() {
             let [before, ten, then] = spans.map(|span| rms(&span));
             if is_measured {
                 let each = paths as f64 / (changes.len() as f64 * count as f64);
-                let wait = waits.iter().sum::<f64>() / waits.len().max(1) as f64;
+                let wait = waits.iter().fold(0.0, |sum, wait| sum + wait) / waits.len().max(1) as f64;
                 eprintln!(
                     "{name}, {moves:?}: | {controller:?} | {before:.2} | {ten:.2} | {then:.2} | {each:.1} | {wait:.1}"
                 );

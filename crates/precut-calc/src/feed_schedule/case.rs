@@ -83,7 +83,7 @@ impl Margin {
         Self { deviations, scatter: Some(scatter) }
     }
 
-    fn bends(&self) -> bool {
+    pub(super) fn bends(&self) -> bool {
         self.scatter.is_some_and(|scatter| scatter.bends())
     }
 
@@ -380,9 +380,13 @@ impl Case {
 
     /// Whether any model, or the margin of a limit, bends over speed and feed.
     pub(super) fn bends(&self) -> bool {
-        let models = self.zones.iter().flat_map(|zone| zone.models.iter().flatten().chain(&zone.further));
-        let margins = self.zones.iter().flat_map(|zone| &zone.margins);
-        models.into_iter().any(|model| model.bends() != Bend::Straight) || margins.into_iter().any(Margin::bends)
+        self.models_bend() || self.zones.iter().flat_map(|zone| &zone.margins).any(Margin::bends)
+    }
+
+    /// Whether any model does.
+    pub(super) fn models_bend(&self) -> bool {
+        let mut models = self.zones.iter().flat_map(|zone| zone.models.iter().flatten().chain(&zone.further));
+        models.any(|model| model.bends() != Bend::Straight)
     }
 }
 

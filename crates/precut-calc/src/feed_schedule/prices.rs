@@ -323,7 +323,8 @@ fn turned(
     };
     let mut best: Option<(f64, f64)> = None;
     for edges in &plans {
-        let variation = Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None };
+        let variation =
+            Variation { parts_per_edge: solved.parts_per_edge, edges: edges.as_ref(), about: None, beside: &[] };
         match solve_as(&case, &variation, false, monitor) {
             Ok(turned) if best.is_none_or(|(least, _)| turned.objective < least) => {
                 best = Some((turned.objective, turned.certificate.gap));

@@ -175,6 +175,8 @@ pub(super) struct Variation<'a> {
     pub edges: Option<&'a EdgeLimits>,
     /// Where bending models are linearised: ln V, ln S per zone, and how far the step may go.
     pub about: Option<(&'a [(f64, f64)], f64)>,
+    /// Further schedules at which limits that are moved in by what bends have tangents.
+    pub beside: &'a [Vec<(f64, f64)>],
 }
 
 /// Whole edges of a part, and limits on what some of them cut together.
@@ -369,19 +371,21 @@ impl Builder<'_> {
         self.variation.about.map_or_else(|| middle_of(self.case, i), |(at, _)| at[i])
     }
 
-    /// By how much a limit in a zone is moved in, as its constant and what it has by ln V and ln S.
-    fn margin(&self, i: usize, kind: &Kind) -> [f64; 3] {
-        let (u, x) = self.about(i);
-        self.case.zones[i].margin(&kind.name()).form(u, x)
+    /// By how much a limit in a zone is moved in, as its constant and what it has by ln V and ln S: every tangent that is asked for.
+    fn margins(&self, i: usize, kind: &Kind) -> Vec<[f64; 3]> {
+        let margin = self.case.zones[i].margin(&kind.name());
+        let beside = self.variation.beside.iter().filter(|_| margin.bends()).map(|at| at[i]);
+        std::iter::once(self.about(i)).chain(beside).map(|(u, x)| margin.form(u, x)).collect()
     }
 
     /// An upper limit on an output, in logarithms or plain.
-    fn output_limit(&mut self, i: usize, output: Output, limit: Option<f64>, kind: Kind) {
+    fn output_limit(&mut self, i: usize, output: Output, limit: Option<f64>, kind: &Kind) {
         let (Some(form), Some(limit)) = (self.form(i, output), limit) else { return };
         let bound = if form.log_log { limit.ln() } else { limit };
-        let [margin, by_speed, by_feed] = self.margin(i, &kind);
-        let constant = form.constant - bound + margin;
-        self.row(i, form.speed + by_speed, form.feed + by_feed, constant, kind, limit, output.unit(), !form.log_log);
+        for [margin, by_speed, by_feed] in self.margins(i, kind) {
+            let (v, s, constant) = (form.speed + by_speed, form.feed + by_feed, form.constant - bound + margin);
+            self.row(i, v, s, constant, kind.clone(), limit, output.unit(), !form.log_log);
+        }
     }
 
     fn zone(&mut self, i: usize) {
@@ -390,15 +394,16 @@ impl Builder<'_> {
         let (limits, machine) = (&case.limits, &case.machine);
         if let (Some(y), Some(c), Some(limit)) = (self.form(i, Output::ForceY), zone.yields(), zone.deflection_max_um) {
             let kappa = limits.deflection_residual_fraction;
-            let [margin, by_speed, by_feed] = self.margin(i, &Kind::Deflection);
-            let constant = y.constant + (kappa * c / limit).ln() + margin;
-            self.row(i, y.speed + by_speed, y.feed + by_feed, constant, Kind::Deflection, limit, "um", false);
+            for [margin, by_speed, by_feed] in self.margins(i, &Kind::Deflection) {
+                let constant = y.constant + (kappa * c / limit).ln() + margin;
+                self.row(i, y.speed + by_speed, y.feed + by_feed, constant, Kind::Deflection, limit, "um", false);
+            }
         }
-        self.output_limit(i, Output::Roughness, zone.roughness_max_um, Kind::Roughness);
-        self.output_limit(i, Output::Hardening, zone.hardening_max_percent, Kind::Hardening);
-        self.output_limit(i, Output::HardeningDepth, zone.hardening_depth_max_um, Kind::HardeningDepth);
-        self.output_limit(i, Output::ForceZ, limits.force_z_max_n, Kind::ForceZ);
-        self.output_limit(i, Output::ForceY, limits.force_y_max_n, Kind::ForceY);
+        self.output_limit(i, Output::Roughness, zone.roughness_max_um, &Kind::Roughness);
+        self.output_limit(i, Output::Hardening, zone.hardening_max_percent, &Kind::Hardening);
+        self.output_limit(i, Output::HardeningDepth, zone.hardening_depth_max_um, &Kind::HardeningDepth);
+        self.output_limit(i, Output::ForceZ, limits.force_z_max_n, &Kind::ForceZ);
+        self.output_limit(i, Output::ForceY, limits.force_y_max_n, &Kind::ForceY);
         if let (Some(t), Some(least)) = (self.form(i, Output::ToolLife), limits.tool_life_min_min) {
             let constant = least.ln() - t.constant + case.edge_margin;
             self.row(i, -t.speed, -t.feed, constant, Kind::ToolLifeMin, least, "min", false);

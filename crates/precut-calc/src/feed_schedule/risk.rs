@@ -347,7 +347,9 @@ struct Shares {
 impl Sharing<'_> {
     /// The schedule, and what the budget is worth: d ln(objective) over d budget.
     fn shared_out(&mut self, job: &Job, held: Option<&Held>) -> Result<(Solved, f64), Unsolved> {
-        let plain = Case::of(&Job { risk: Risk::None {}, ..job.clone() }, held, None)?;
+        let mut plain = Case::of(&Job { risk: Risk::None {}, ..job.clone() }, held, None)?;
+        // Edges have a risk of their own beside it.
+        plain.edge_margin = self.case.edge_margin;
         let first = self.shares_at(&plain, solve(&plain, true, self.monitor)?.at);
         let mut tangents = Affines::new();
         self.touch(&plain, &first, &mut tangents);

@@ -285,7 +285,13 @@ fn linearised(case: &Case, given: &Variation<'_>, why: bool, monitor: &dyn Monit
     for share in starts {
         let shift = |i: usize| if built.speed[i].variable.is_some() { (share - 0.5) * range } else { 0.0 };
         let at = middle.iter().enumerate().map(|(i, &(u, x))| (u + shift(i), x)).collect();
-        match from_start(case, given, at, monitor) {
+        let found = match from_start(case, given, at, monitor) {
+            Err(Unsolved::Failed(Failure::NotConverged { .. })) if !case.models_bend() => {
+                by_tangents(case, given, monitor)
+            }
+            found => found,
+        };
+        match found {
             Ok(solved) => return Ok(solved),
             Err(Unsolved::Failed(Failure::Cancelled)) => return Err(Failure::Cancelled.into()),
             // Not converged weighs more than infeasible: something may be there.
@@ -362,10 +368,39 @@ fn from_start(
         })
     };
     let (_, kept) = best.ok_or_else(stalled)?;
-    // The schedule itself, as the optimum of a program that may not leave it by more than a hair.
-    let mut solved = once(case, &Variation { about: Some((&kept, 1e-5)), ..given.clone() }, false)?;
-    solved.linearisations = LINEARISATIONS;
+    let mut solved = settled(case, given, &kept, LINEARISATIONS)?;
     solved.local = true;
+    Ok(solved)
+}
+
+/// Most tangents of a limit.
+const TANGENTS: u32 = 200;
+
+/// The same where only margins bend, which is convex, by all tangents that were made (Kelley): each leaves out nothing that keeps the
+/// limits, so that what they leave nothing to has no schedule.
+fn by_tangents(case: &Case, given: &Variation<'_>, monitor: &dyn Monitor) -> Result<Solved, Unsolved> {
+    let middle = build(case, given);
+    let y = &middle.program.start;
+    let mut points: Vec<Vec<(f64, f64)>> =
+        vec![(0..case.zones.len()).map(|i| (middle.speed[i].at(y), middle.feed[i].at(y))).collect()];
+    for round in 1..=TANGENTS {
+        checkpoint(monitor)?;
+        let Some((about, beside)) = points.split_last() else { break };
+        let variation = Variation { about: Some((about, f64::INFINITY)), beside, ..given.clone() };
+        let at = once(case, &variation, false)?.at;
+        if keeps(case, given, &at) {
+            return settled(case, given, &at, round);
+        }
+        points.push(at);
+    }
+    let what = "the tangents of limits that are moved in";
+    Err(Unsolved::Failed(Failure::NotConverged { what, residual: f64::NAN, iterations: TANGENTS }))
+}
+
+/// A schedule itself, as the optimum of a program that may not leave it by more than a hair.
+fn settled(case: &Case, given: &Variation<'_>, at: &[(f64, f64)], rounds: u32) -> Result<Solved, Unsolved> {
+    let mut solved = once(case, &Variation { about: Some((at, 1e-5)), ..given.clone() }, false)?;
+    solved.linearisations = rounds;
     Ok(solved)
 }
 

@@ -164,7 +164,7 @@ fn limits_of_zones(job: &Job, outcome: &Outcome, held: Option<&Held>) -> Result<
     let at = exact(outcome);
     let edges = outcome.certificate.lower_bound.map(|_| edges::limits_of(&case, outcome));
     let about = Some((at.as_slice(), f64::INFINITY));
-    let variation = Variation { parts_per_edge: outcome.parts_per_edge, edges: edges.as_ref(), about };
+    let variation = Variation { parts_per_edge: outcome.parts_per_edge, edges: edges.as_ref(), about, beside: &[] };
     let built = build(&case, &variation);
     Ok((case, built))
 }

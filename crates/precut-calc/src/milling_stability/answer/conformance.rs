@@ -51,12 +51,12 @@ const ALL: usize = LIMITS;
 const MOST_LINES: [usize; 2] = [128, 32];
 const MOST_LINES_TRIED: [usize; 2] = [64, 4];
 /// Lines of one scrambling on which cuts are compared.
-const COMPARED_LINES: usize = 2;
+const COMPARED_LINES: usize = 4;
 /// Draws of the real model that an answer takes, roughly: lines of the answer itself, of a depth that is tried, and of a quantity of
 /// half a width.
 const DRAWS: f64 = 3000.0;
 const DRAWS_TRIED: f64 = 500.0;
-const DRAWS_COMPARED: f64 = 300.0;
+const DRAWS_COMPARED: f64 = 600.0;
 const DEPTHS_TRIED: f64 = 6.0;
 
 /// Codes of what is said here.
