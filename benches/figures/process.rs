@@ -18,7 +18,7 @@ fn job(length_mm: f64) -> Value {
     json!({
         "shaft": {
             "segments": [{ "length_mm": length_mm, "diameter_mm": 40.0, "stock_diameter_mm": 41.6 }],
-            "youngs_modulus_n_per_mm2": 210000.0
+            "youngs_modulus_n_per_mm2": 210_000.0
         },
         "supports": [
             { "kind": "centre", "z_mm": 0.0, "compliance_um_per_n": 0.02 },

@@ -81,7 +81,7 @@ impl Scale<'_> {
             next = Some(part.number);
             let weight = self.onset(newest.ordinal - part.ordinal, part.ordinal);
             if weight > 0.0 {
-                self.since(part.number, weight, &sums, null, &tried, hear);
+                tried.since(part.number, weight, &sums, null, hear);
             }
         }
     }
@@ -99,28 +99,6 @@ impl Scale<'_> {
                 }
             }
             _ => 0.0,
-        }
-    }
-
-    fn since(&self, since: u32, weight: f64, sums: &Sums, null: &Null, tried: &Tried, hear: Hear<'_>) {
-        for form in [Form::Step, Form::Drift] {
-            let halved = sums.halved(form, null);
-            for own in tried.causes.iter().filter(|own| own.form == form) {
-                let fit = sums.one(COSINES + own.variant, form, own.scale, &halved, null).within(&own.reach);
-                let (what, log_weight) = (What::Cause(own.variant), weight.ln() + own.log_share + fit.log_bf);
-                let Fit { mean, variance, .. } = fit;
-                hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
-            }
-            if form == Form::Step {
-                let cosines = sums.cosines(&halved, null);
-                for (size, sd) in tried.waves.iter().enumerate() {
-                    let Some(waves) = cosines.waves(sd) else { continue };
-                    let prior = weight * UNNAMED / SIZES.len() as f64;
-                    let (what, log_weight) = (What::Unnamed(size), prior.ln() + waves.log_bf);
-                    let waves = Some(Box::new(waves));
-                    hear(Entry { since, what, form, log_weight, mean: 0.0, variance: 0.0, waves }, &halved);
-                }
-            }
         }
     }
 
@@ -188,6 +166,29 @@ impl Tried {
             }
         }
         Self { causes, waves: (0..SIZES.len()).map(|size| scale.waves(size)).collect() }
+    }
+
+    /// All of it since an onset of this weight.
+    fn since(&self, since: u32, weight: f64, sums: &Sums, null: &Null, hear: Hear<'_>) {
+        for form in [Form::Step, Form::Drift] {
+            let halved = sums.halved(form, null);
+            for own in self.causes.iter().filter(|own| own.form == form) {
+                let fit = sums.one(COSINES + own.variant, form, own.scale, &halved, null).within(&own.reach);
+                let (what, log_weight) = (What::Cause(own.variant), weight.ln() + own.log_share + fit.log_bf);
+                let Fit { mean, variance, .. } = fit;
+                hear(Entry { since, what, form, log_weight, mean, variance, waves: None }, &halved);
+            }
+            if form == Form::Step {
+                let cosines = sums.cosines(&halved, null);
+                for (size, sd) in self.waves.iter().enumerate() {
+                    let Some(waves) = cosines.waves(sd) else { continue };
+                    let prior = weight * UNNAMED / SIZES.len() as f64;
+                    let (what, log_weight) = (What::Unnamed(size), prior.ln() + waves.log_bf);
+                    let waves = Some(Box::new(waves));
+                    hear(Entry { since, what, form, log_weight, mean: 0.0, variance: 0.0, waves }, &halved);
+                }
+            }
+        }
     }
 }
 

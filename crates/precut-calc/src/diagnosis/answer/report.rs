@@ -51,11 +51,7 @@ pub(in crate::diagnosis) fn answer<M: Diagnosable>(
     stage(monitor, 0.05, "diagnosis_stage_signatures");
     let mut foundation = Foundation::of(bound, data, monitor)?;
     let found = foundation.outliers(monitor)?;
-    foundation.structure.clone_from(&found.structure);
-    if job.options.leave_outliers_out {
-        foundation.heavy_tails.clone_from(&found.heavy_tails);
-    }
-    let keep = if job.options.leave_outliers_out { foundation.keep(&found) } else { foundation.predicted.clone() };
+    let keep = foundation.heed(&found, job.options.leave_outliers_out);
     stage(monitor, 0.2, "diagnosis_stage_search");
     let [effort, fold_effort] = efforts(&job.options, used.len(), bound);
     let mut weighing = Weighing::of(&foundation, keep, effort, monitor)?;

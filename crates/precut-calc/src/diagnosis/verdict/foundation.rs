@@ -77,6 +77,16 @@ impl<'a> Foundation<'a> {
         outliers(self.data, &self.residual, None, monitor)
     }
 
+    /// What was found of single rows, from here on; the rows that are kept.
+    pub(in crate::diagnosis) fn heed(&mut self, found: &Outliers, leave_outliers_out: bool) -> Vec<bool> {
+        self.structure.clone_from(&found.structure);
+        if !leave_outliers_out {
+            return self.predicted.clone();
+        }
+        self.heavy_tails.clone_from(&found.heavy_tails);
+        self.keep(found)
+    }
+
     /// Of the rows that are kept, those that tell of the scatter.
     pub(in crate::diagnosis) fn scattering(&self, keep: &[bool]) -> Vec<bool> {
         let mut scattering = keep.to_vec();
