@@ -97,6 +97,7 @@ const LATIN: &[&str] = &[
     "common",
     "quadratic",
     "from",
+    "held",
     "holder",
     "ETag",
     "If-Match",
