@@ -287,7 +287,7 @@ fn basis(job: &Job) -> Vec<Basis> {
     }
     if !job.tolerance.is_none() {
         used.push(Basis {
-            equation: "certainty/4",
+            equation: "program/10",
             source: "lines through what is uncertain, the program driven again",
         });
     }
