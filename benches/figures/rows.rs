@@ -202,7 +202,9 @@ pub(crate) fn all() -> Vec<Row> {
         row("a part of a watched process, twelve rows, one type", Unit::Time, us(1000.0), us(200.0), || {
             process::part(1, 12)
         }),
-        row("the same with 200 rows and three types", Unit::Time, us(5000.0), us(1000.0), || process::part(3, 200)),
+        row("a part of a watched process, 200 rows, three types", Unit::Time, us(5000.0), us(1000.0), || {
+            process::part(3, 200)
+        }),
         row("a thousand parts of a watched process, twelve rows", Unit::Time, us(1e6), us(200_000.0), || {
             process::replay(1, 12, 1000)
         }),
