@@ -83,5 +83,6 @@ impl Memory {
         self.older = self.older.without(&known);
         let mut stays = gone.iter().map(|gone| !gone);
         self.columns.retain(|_| stays.next().unwrap_or(true));
+        self.free_again();
     }
 }

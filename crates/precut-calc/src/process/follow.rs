@@ -123,6 +123,7 @@ impl Memory {
                 }
             }
         }
+        self.free_again();
         if let Some(change) = self.changes.iter_mut().find(|change| change.id == pending.id) {
             change.accepted = true;
         }
@@ -169,6 +170,7 @@ impl Memory {
         let gone = self.accepted.remove(place);
         self.parts.retain(|(part, _)| part.number >= gone.since);
         self.columns.retain(|column| !gone.owns(column));
+        self.free_again();
         self.older = Older::none();
     }
 }

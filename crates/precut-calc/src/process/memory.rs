@@ -182,6 +182,7 @@ impl Memory {
 
     /// Columns of what shows for the first time.
     fn free_up(&mut self, part: &Sighting) {
+        let before = self.columns.len();
         let knows = |columns: &[Column], source: Source| columns.iter().any(|own| own.source == source);
         if !knows(&self.columns, Source::Profile { kind: part.kind, order: 0 }) {
             self.columns.extend(Column::profile(part.kind, part.signs.per_um));
@@ -192,11 +193,19 @@ impl Memory {
                 self.columns.push(Column { source: Source::Cause(variant), since: None, sd: 1.0 });
             }
         }
+        if self.columns.len() > before {
+            self.free_again();
+        }
         // What came before shows nothing of a new cause.
         let basic = COSINES + self.catalogue.variants.len() + 1;
         if self.parts.iter().any(|(_, gram)| gram.as_ref().is_some_and(|gram| gram.inner.nrows() != basic)) {
             self.look_again();
         }
+    }
+
+    /// Other columns are free than before.
+    pub(super) fn free_again(&mut self) {
+        self.parts.iter_mut().filter_map(|(_, gram)| gram.as_mut()).for_each(Gram::forget_free);
     }
 
     pub(super) fn look_again(&mut self) {

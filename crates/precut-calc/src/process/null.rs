@@ -1,5 +1,7 @@
 //! What is free although nothing changed, and what the parts tell of it (`process/3.1`).
 
+use std::sync::OnceLock;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
@@ -81,9 +83,28 @@ pub(super) struct Gram {
     pub(super) inner: DMatrix<f64>,
     /// How many rows it stands for, with the readings of a master.
     pub(super) rows: usize,
+    /// B'B and B'r with the weights under which they were asked for first.
+    free: OnceLock<OfFree>,
+}
+
+/// B'B, its lower triangle alone, and B'r of a part.
+#[derive(Clone)]
+struct OfFree {
+    weights: Vec<(f64, usize)>,
+    a: DMatrix<f64>,
+    eta: DVector<f64>,
 }
 
 impl Gram {
+    pub(super) fn new(inner: DMatrix<f64>, rows: usize) -> Self {
+        Self { inner, rows, free: OnceLock::new() }
+    }
+
+    /// Something else is free: B'B is to be made anew. Where that is left out it is made at every sum.
+    pub(super) fn forget_free(&mut self) {
+        self.free = OnceLock::new();
+    }
+
     pub(super) fn of(part: &Sighting, scatter: &Scatter, catalogue: &Catalogue) -> Self {
         let data = part.data();
         let whitener = Whitener::new(&data, &scatter.noise(), &part.scatter(&scatter.factors), &part.keep);
@@ -117,7 +138,7 @@ impl Gram {
                 inner[(last, last)] += weight * read * read;
             }
         }
-        Self { inner, rows: part.keep.iter().filter(|keep| **keep).count() + part.checks.len() }
+        Self::new(inner, part.keep.iter().filter(|keep| **keep).count() + part.checks.len())
     }
 
     pub(super) fn residual(&self) -> usize {
@@ -149,6 +170,21 @@ impl<'a> Told<'a> {
 
     /// B'B, added to the lower triangle, which is all that a factorisation reads.
     fn add_to(&self, a: &mut DMatrix<f64>, eta: &mut DVector<f64>) {
+        let known = self.gram.free.get_or_init(|| {
+            let count = self.free.len();
+            let (mut a, mut eta) = (DMatrix::zeros(count, count), DVector::zeros(count));
+            self.add_anew(&mut a, &mut eta);
+            OfFree { weights: self.free.clone(), a, eta }
+        });
+        if known.weights == self.free {
+            *a += &known.a;
+            *eta += &known.eta;
+        } else {
+            self.add_anew(a, eta);
+        }
+    }
+
+    fn add_anew(&self, a: &mut DMatrix<f64>, eta: &mut DVector<f64>) {
         let last = self.gram.residual();
         for (j, &(weight, own)) in self.free.iter().enumerate() {
             if weight == 0.0 {

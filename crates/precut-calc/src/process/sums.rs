@@ -8,9 +8,9 @@ use super::sight::COSINES;
 
 /// G, b and c of every basic column over the parts since an onset, for a step and for a drift; of the cosines all products.
 pub(super) struct Sums {
-    /// X'X of every column alone: times 1, times n - tau + 1, and times its square.
+    /// X'X of every column alone: times 1, times n - tau, and times its square.
     square: [Vec<f64>; 3],
-    /// X'r: times 1, and times n - tau + 1.
+    /// X'r: times 1, and times n - tau.
     right: [Vec<f64>; 2],
     /// X'B, likewise.
     free: [DMatrix<f64>; 2],
@@ -122,17 +122,16 @@ impl Sums {
     pub(super) fn begin_with(&mut self, part: &Told<'_>) {
         let (inner, last) = (&part.gram.inner, part.gram.residual());
         for basic in 0..last {
-            self.square.iter_mut().for_each(|sums| sums[basic] += inner[(basic, basic)]);
-            self.right.iter_mut().for_each(|sums| sums[basic] += inner[(basic, last)]);
+            self.square[0][basic] += inner[(basic, basic)];
+            self.right[0][basic] += inner[(basic, last)];
         }
         for (k, &(weight, own)) in part.free.iter().enumerate() {
             if weight == 0.0 {
                 continue;
             }
             let column = inner.column(own);
-            for sums in &mut self.free {
-                sums.column_mut(k).iter_mut().zip(column.iter()).for_each(|(sum, product)| *sum += weight * product);
-            }
+            let sums = self.free[0].column_mut(k).into_iter().zip(column.iter());
+            sums.for_each(|(sum, product)| *sum += weight * product);
         }
         self.waves += inner.view((0, 0), (COSINES, COSINES));
     }
@@ -141,7 +140,7 @@ impl Sums {
     pub(super) fn halved(&self, form: Form, null: &Null) -> DMatrix<f64> {
         match form {
             Form::Step => null.halved(&self.free[0].transpose()),
-            Form::Drift => null.halved(&(self.free[1].transpose() / DRIFT_PARTS)),
+            Form::Drift => null.halved(&((&self.free[0] + &self.free[1]).transpose() / DRIFT_PARTS)),
         }
     }
 
@@ -149,7 +148,12 @@ impl Sums {
     pub(super) fn one(&self, basic: usize, form: Form, scale: f64, halved: &DMatrix<f64>, null: &Null) -> Fit {
         let (g, b) = match form {
             Form::Step => (self.square[0][basic], self.right[0][basic]),
-            Form::Drift => (self.square[2][basic] / DRIFT_PARTS.powi(2), self.right[1][basic] / DRIFT_PARTS),
+            // A drift acts (n - tau + 1)/20: (k + 1)^2 = k^2 + 2 k + 1.
+            Form::Drift => {
+                let [one, first, second] = self.square.each_ref().map(|sums| sums[basic]);
+                let right = self.right[0][basic] + self.right[1][basic];
+                ((second + 2.0 * first + one) / DRIFT_PARTS.powi(2), right / DRIFT_PARTS)
+            }
         };
         let own = halved.column(basic);
         let (g, b) = ((g - own.norm_squared()).max(0.0), b - own.dot(&null.half));
@@ -306,7 +310,7 @@ mod tests {
     #[test]
     fn running_sums_give_the_ratio_of_dense_normal_densities() {
         let stream = stream();
-        let gram = |rows: &DMatrix<f64>| Gram { inner: rows.tr_mul(rows), rows: rows.nrows() };
+        let gram = |rows: &DMatrix<f64>| Gram::new(rows.tr_mul(rows), rows.nrows());
         let grams: Vec<Gram> = stream.parts.iter().map(|(.., rows)| gram(rows)).collect();
         let told: Vec<Told<'_>> = stream
             .parts
