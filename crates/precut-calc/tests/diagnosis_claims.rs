@@ -276,7 +276,7 @@ fn the_search_over_vises_loses_no_set() {
 #[test]
 fn the_search_over_vises_loses_no_second_mode() {
     let draw: Draw = |_, snr, seed| fixture::draw_hiding("second_mode", snr, seed);
-    search_keeps_what_is_there::<FixtureStability>(draw, 81, 3);
+    search_keeps_what_is_there::<FixtureStability>(draw, 81, 6);
 }
 
 /// What is promised of a compensated shaft is what the path leaves that the calculator puts out.

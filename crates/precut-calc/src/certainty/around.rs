@@ -145,8 +145,9 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         (0..self.slopes.len()).min_by(order).unwrap_or(0)
     }
 
-    /// What the doubt is made of in the limit that fails most often, quantities of one name together; where `lines` of a scrambling are given, what half of a width
-    /// makes of it: by how much the models differ from those of the whole width on the same few lines.
+    /// The share that each quantity has in the doubt about the limit that fails most often; quantities of one name count together.
+    /// With `lines`, so many of a scrambling, also the probability with half of its width: both widths are tried on the same lines,
+    /// and their difference is added to the probability found.
     pub(crate) fn contributions(&self, found: &Found<S>, lines: Option<usize>) -> Result<Vec<Contribution>, Failure> {
         let of = self.asked.uncertainties;
         let probability = found.of[S - 1].probability;

@@ -1,4 +1,4 @@
-//! How probable it is that what a program leaves keeps the limits of the drawing (`certainty/4`).
+//! How probable it is that what a program leaves keeps the limits of the drawing (`program/10`).
 //!
 //! The parts are those of the program that is given back, or of the given one where there is none: read and driven again with draws
 //! of what is uncertain, and held against what is meant.
