@@ -43,6 +43,27 @@ fn the_strip_of_a_diagnosis_says_what_is_named_how_surely_and_what_it_gains() {
     page.assert_calm();
 }
 
+/// Green says that nothing is to be heeded: an answer with a warning is marked as one.
+#[test]
+fn an_answer_with_a_warning_is_marked() {
+    let Some((_turn, mut page, service)) = both() else { return };
+    let mut seen = [false, false];
+    for place in [
+        "deflection-compensation?example=paper",
+        "deflection-compensation?example=two_passes",
+        "ring-roundness?example=how_sure",
+    ] {
+        page.open(&service.page(place));
+        page.until(SETTLED);
+        let is_warned = page.evaluate("document.querySelectorAll('.words .warnings li').length > 0") == true;
+        let is_marked = page.evaluate("getComputedStyle(document.querySelector('.strip')).borderLeftColor !== (() => { const it = document.createElement('i'); it.style.color = 'var(--good)'; document.body.append(it); return getComputedStyle(it).color })()");
+        assert_eq!(is_marked, is_warned, "{place}");
+        seen[usize::from(is_warned)] = true;
+    }
+    assert_eq!(seen, [true, true]);
+    page.assert_calm();
+}
+
 #[test]
 fn the_start_page_shows_outcomes() {
     let Some((_turn, mut page, service)) = both() else { return };

@@ -74,7 +74,7 @@ export function Strip({ id, description, answer, said, limits, numbers, main, st
   };
   const why = WHY[standing];
   return html`
-    <section class=${`strip ${why ? `not-theirs ${standing}` : ''}`} id="answer" aria-label=${t('answer')} tabindex="-1">
+    <section class=${`strip ${why ? `not-theirs ${standing}` : answer.answer.warnings.length > 0 ? 'warned' : ''}`} id="answer" aria-label=${t('answer')} tabindex="-1">
       <div class="told-first"><p class="verdict" aria-live="polite">${capital(said ?? '')}</p>
         ${limits && html`<p class="limits">${capital(brief(limits))}</p>`}</div>
       <dl class="headline">${numbers.map(row => html`<div key=${row.label} title=${row.title}><dt>${row.label}</dt><dd>${row.text}${row.unit && html`<small> ${row.unit}</small>`}</dd></div>`)}</dl>
