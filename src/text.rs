@@ -9,7 +9,7 @@
 pub(crate) mod complete;
 mod described;
 mod glossary;
-mod kept;
+pub(crate) mod kept;
 mod language;
 mod mark;
 mod named;

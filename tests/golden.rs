@@ -1,9 +1,9 @@
-//! The numbers of every example, per version of its calculator: if they change, the version must rise.
+//! The numbers and the equations of every example, per version of its calculator: if they change, the version must rise.
 //!
 //! `PRECUT_WRITE_GOLDEN=1 cargo test --test golden` writes them down anew; the diff belongs to the review.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use precut::engine::{Body, solve_now};
@@ -52,11 +52,14 @@ fn numbers_change_only_with_the_version_and_the_start_page_shows_them() {
     for entry in registry.entries() {
         let meta = entry.meta();
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{}.json", meta.id));
-        let mut found = BTreeMap::new();
+        let (mut found, mut equations) = (BTreeMap::new(), BTreeSet::new());
         for example in meta.examples {
             let stored = solve_now(&registry, meta.id, Body::Json(example.job.into()), &Unwatched).unwrap();
             let answer: Value = serde_json::from_slice(&stored.body).unwrap();
             digest(&answer["result"], example.id, &mut found);
+            let basis = answer["basis"].as_array().unwrap();
+            assert!(!basis.is_empty(), "{}: {} says by what", meta.id, example.id);
+            equations.extend(basis.iter().map(|basis| basis["equation"].as_str().unwrap().to_owned()));
             if !pictures.contains_key(meta.id)
                 && let Some(main) = stored.figures().unwrap().into_iter().find(|figure| figure.id == meta.figures[0])
             {
@@ -64,11 +67,15 @@ fn numbers_change_only_with_the_version_and_the_start_page_shows_them() {
             }
         }
         if std::env::var_os("PRECUT_WRITE_GOLDEN").is_some() {
-            let text = serde_json::to_string_pretty(&json!({ "version": meta.version, "numbers": found })).unwrap();
+            let text = serde_json::to_string_pretty(
+                &json!({ "version": meta.version, "equations": equations, "numbers": found }),
+            )
+            .unwrap();
             std::fs::write(&file, text + "\n").unwrap();
         }
         let golden: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
         assert_eq!(golden["version"], meta.version, "{}: write the golden numbers of the new version", meta.id);
+        assert_eq!(golden["equations"], json!(equations), "{}: another basis", meta.id);
         let golden = golden["numbers"].as_object().unwrap();
         assert_eq!(golden.len(), found.len(), "{}: other numbers than version {} has", meta.id, meta.version);
         for (place, number) in &found {

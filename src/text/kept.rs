@@ -38,7 +38,7 @@ pub(crate) fn reworded_rows(text: &[u8], language: Language) -> Option<Vec<u8>> 
 }
 
 fn remark(item: &Value, language: Language) -> Option<Value> {
-    let message = Message { code: interned(item["code"].as_str()?), values: values(item.get("values"))? };
+    let message = message(item)?;
     Texts::shared().try_word(language, "explanation", message.code, &message.values).ok()?;
     written(&Texts::shared().remark(language, &message))
 }
@@ -53,8 +53,13 @@ fn written(value: &impl Serialize) -> Option<Value> {
     serde_json::to_value(value).ok()
 }
 
-/// A fault or warning as it stands in documents, back to its code and numbers.
-pub(super) fn finding(item: &Value) -> Option<Finding> {
+/// A sentence of the explanation as it stands in documents, back to its code and numbers.
+pub(crate) fn message(item: &Value) -> Option<Message> {
+    Some(Message { code: interned(item["code"].as_str()?), values: values(item.get("values"))? })
+}
+
+/// A fault or warning likewise.
+pub(crate) fn finding(item: &Value) -> Option<Finding> {
     let mut finding = Finding::new(interned(item["code"].as_str()?), item["pointer"].as_str()?);
     finding.value = item["value"].as_f64();
     finding.limit = item["limit"].as_f64();
