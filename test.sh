@@ -30,6 +30,9 @@ declare -A ABOUT=(
   [attack]="schemathesis against the running service, all checks"
 )
 MACHETE=0.9.2
+# What the tests build: all but the unit tests of the calculators, which are built by themselves.
+WORKSPACE=(--workspace --exclude precut-calc --locked)
+UNITS=(--package precut-calc --lib --locked --config 'profile.dev.package.precut-calc.opt-level=0')
 ABSENT=77 # exit code of a step whose tool is not to be had
 
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-auto}
@@ -96,7 +99,7 @@ node_tools() { # node_tools FROM FOLDER: installs into the folder what FROM/pack
 
 binary() { # prints the path of the debug build, made now
   # Beside a test, as the tests' step builds it: alone its dependencies have fewer features, and are built once more.
-  cargo test --workspace --locked --no-run --test contract_fields >&2
+  cargo test "${WORKSPACE[@]}" --no-run --test contract_fields >&2
   echo "$(target)/debug/precut"
 }
 
@@ -180,12 +183,15 @@ run_tests() {
     [ "$name" = browser ] || others+=(--test "$name")
   done
   others+=(--test library)
-  cargo test --workspace --locked --no-run
+  cargo test "${WORKSPACE[@]}" --no-run
+  # Its own unit tests are small and run for moments: optimised as their crate is, they would build for minutes.
+  cargo test "${UNITS[@]}" --no-run
   # The calculators' own tests only compute: they get what the others leave of the cores, which wait for processes and
   # pages. The pages of a browser leave nothing to those that wait for a process, so they come after them.
   run_beside calc nice -n 19
-  cargo test --workspace --locked --no-fail-fast --lib --bins "${others[@]}" || code=1
-  cargo test --workspace --locked --no-fail-fast --test browser || code=1
+  cargo test "${UNITS[@]}" --no-fail-fast || code=1
+  cargo test "${WORKSPACE[@]}" --no-fail-fast --lib --bins "${others[@]}" || code=1
+  cargo test "${WORKSPACE[@]}" --no-fail-fast --test browser || code=1
   for name in "${beside[@]}"; do
     wait "${name%% *}" || code=1
     cat "${name#* }"
@@ -199,7 +205,7 @@ run_beside() { # run_beside PROGRAM [COMMAND...]: runs a program of tests in the
   local log program=$1
   shift
   log=$(mktemp)
-  "$@" cargo test --workspace --locked --no-fail-fast --test "$program" >"$log" 2>&1 &
+  "$@" cargo test "${WORKSPACE[@]}" --no-fail-fast --test "$program" >"$log" 2>&1 &
   beside+=("$! $log")
 }
 

@@ -101,7 +101,7 @@ fn each_folder_of_a_room_knows_those_before_it_alone() {
         for (place, folders) in order.iter().enumerate() {
             let later = order[place + 1..].iter().flat_map(|later| *later);
             let later: Vec<String> =
-                later.flat_map(|later| [format!("{room}::{later}::"), format!("super::{later}::")]).collect();
+                later.flat_map(|later| [format!("{room}::{later}::"), format!("super::super::{later}::")]).collect();
             for folder in folders.iter().map(|folder| format!("crates/precut-calc/src/{room}/{folder}")) {
                 if root().join(&folder).exists() {
                     forbid_paths(&folder, &later);
