@@ -9,7 +9,7 @@ use crate::calculator::{
     TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::diameters::{Aim, Tolerance};
-use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint, JointUncertainty};
 use crate::num::beam::Profile;
 use crate::shaft::places;
 
@@ -226,6 +226,7 @@ impl ForwardModel for DeflectionCompensation {
     type Prepared = PreparedDeflection;
 
     const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["depth_mm", "feed_mm_per_rev", "speed_m_per_min"];
 
@@ -254,8 +255,14 @@ impl ForwardModel for DeflectionCompensation {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        let mut job = Job { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(

@@ -102,7 +102,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -249,7 +249,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         .outcome(driven, passes, &errors, monitor)?;
     outcome.included_automatically = included_automatically;
     (outcome.aim_shift_um, outcome.conformance, outcome.error_fan) = (sure.aim_um, sure.conformance, sure.fan);
-    let uncertainty_um = uncertainty_um(job, &acting, &stage);
+    let uncertainty_um = uncertainty_um(job, &grid, &acting, &stage)?;
     let drawn = drawn.flatten();
     let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
     let warnings = advice::with_earlier(warnings, of_passes);
@@ -393,6 +393,7 @@ const CODES: Codes = Codes {
         diameters::CODES,
         certainty::DISTRIBUTION_CODES,
         certainty::QUANTITY_CODES,
+        certainty::open::CODES,
         crate::shaft::check::CODES,
         force::FAULT_CODES,
     ],

@@ -39,6 +39,7 @@ pub(crate) use statistics::discrepancy::spread_of_cosines;
 pub(crate) use statistics::evidence::log_sum_exp;
 pub(crate) use statistics::whiten::Whitener;
 
+pub use crate::effects::{JointUncertainty, ParameterMove};
 pub use answer::blunder::BlunderReport;
 pub use answer::classes::{ClassHeldOut, ClassReport};
 pub use answer::output::*;
@@ -53,8 +54,8 @@ pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS, PriorWeight};
 pub use model::downstream::{DecisionReport, DownstreamReport};
 pub use model::extension::ExtensionKind;
 pub use model::gain::{Gain, gain};
+pub use model::known::Known;
 pub(crate) use model::known::moves_between;
-pub use model::known::{JointUncertainty, Known, ParameterMove};
 pub use model::next::NextMeasurement;
 pub use model::outlying::OutlyingRun;
 pub use rows::data::{Data, Layout};

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::quantities::{DeflectionCorrelation, DeflectionUncertainQuantity};
+use crate::effects::JointUncertainty;
 
 /// What the drawing allows, on the diameter.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -119,6 +120,11 @@ pub struct Uncertainty {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 55, extensions(("x-advanced" = json!(true))))]
     pub correlations: Vec<DeflectionCorrelation>,
+    /// What is not known of the effects of the job, as a diagnosis leaves it; a stored model brings its own. It takes the place of what
+    /// is usual of the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 256, extensions(("x-advanced" = json!(true))))]
+    pub effects: Vec<JointUncertainty>,
     /// Whether what is usual is uncertain, too, where nothing is said of it: force, stiffness and the tool's setting.
     #[serde(default = "yes")]
     #[schema(default = true, example = true)]
@@ -176,6 +182,7 @@ impl Default for Uncertainty {
             stiffness_percent: ten_percent(),
             quantities: Vec::new(),
             correlations: Vec::new(),
+            effects: Vec::new(),
             measurement: None,
             defaults: yes(),
             wanted_probability: nineteen_of_twenty(),

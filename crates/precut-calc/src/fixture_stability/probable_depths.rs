@@ -16,10 +16,11 @@ use super::answer::{Study, WITHIN, removal_rate};
 use super::conformance::Judged;
 use super::floquet::Working;
 use super::holding::Holding;
+use super::input::FixtureJob;
 use super::lobes::{BoundaryPoint, Plane, boundary};
 use super::parts::plane_of;
 use super::speeds::said;
-use super::uncertain::{Drawn, FixtureQuantity, drawn};
+use super::uncertain::{Drawn, FixtureQuantity, drawn, scales_alone};
 
 /// Draws of the vise.
 const DRAWS: usize = 1024;
@@ -157,11 +158,11 @@ pub(super) fn scales(case: &Case) -> bool {
 /// The depths over the speeds of the job's lobe diagram; `None` where two numbers do not tell the limit.
 pub(super) fn probable_depths(study: &Study<'_>, judged: &Judged<'_>) -> Result<Option<ProbableDepths>, Failure> {
     let case = &study.case;
-    if !scales(case) {
+    if !scales(case) || !scales_alone(study.job) {
         return Ok(None);
     }
     let plane = plane_of(study.job, case, study.examined_mm);
-    let scalings = scalings(case, judged.uncertainties(), study.job.uncertainty.seed);
+    let scalings = scalings(study.job, case, judged.uncertainties())?;
     let net = net(study, &plane, &scalings)?;
     let last = plane.speeds.saturating_sub(1).max(1) as f64;
     let speeds: Vec<f64> = (0..plane.speeds).map(|index| plane.speed_rpm(index as f64 / last)).collect();
@@ -187,9 +188,16 @@ pub(super) fn probable_depths(study: &Study<'_>, judged: &Judged<'_>) -> Result<
     }))
 }
 
-fn scalings(case: &Case, uncertainties: &Uncertainties<FixtureQuantity>, seed: u32) -> Vec<Scaling> {
-    let of = |point: Vec<f64>| Scaling::of(case, &drawn(case, uncertainties, &uncertainties.values(&point)));
-    points(DRAWS, uncertainties.of.len(), seed).map(of).collect()
+fn scalings(
+    job: &FixtureJob,
+    case: &Case,
+    uncertainties: &Uncertainties<FixtureQuantity>,
+) -> Result<Vec<Scaling>, Failure> {
+    let of = |point: Vec<f64>| {
+        let there = drawn(job, case, uncertainties, &uncertainties.values(&point))?;
+        Ok(Scaling::of(case, &there))
+    };
+    points(DRAWS, uncertainties.dimensions(), job.uncertainty.seed).map(of).collect()
 }
 
 fn net(study: &Study<'_>, plane: &Plane, scalings: &[Scaling]) -> Result<Net, Failure> {

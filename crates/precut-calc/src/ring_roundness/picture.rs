@@ -20,6 +20,7 @@ pub(super) const DOUBT_LABELS: &[&str] = &[
     "doubt_roller_runout",
     "doubt_blank_amplitude",
     "doubt_phases",
+    crate::certainty::picture::MODEL_LABEL,
 ];
 
 /// Codes that the figures utter.

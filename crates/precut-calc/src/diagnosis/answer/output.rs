@@ -11,7 +11,7 @@ use crate::diagnosis::answer::blunder::BlunderReport;
 use crate::diagnosis::answer::classes::ClassReport;
 use crate::diagnosis::model::downstream::DownstreamReport;
 use crate::diagnosis::model::extension::ExtensionKind;
-use crate::diagnosis::model::known::JointUncertainty;
+use crate::effects::JointUncertainty;
 
 /// What the measurements say about the base model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
