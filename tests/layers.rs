@@ -83,13 +83,47 @@ fn the_compute_crates_depend_on_nothing_of_the_service() {
     }
 }
 
+/// The folders of a room in the order in which they know each other. What is asked and the physics are one: they know the
+/// words of an answer (`output`), not how it is said.
 #[test]
-fn each_folder_of_the_diagnosis_knows_those_before_it_alone() {
-    let folders = ["rows", "statistics", "causes", "verdict", "model", "answer"];
-    for (place, folder) in folders.iter().enumerate() {
-        let later: Vec<String> = folders[place + 1..].iter().map(|later| format!("diagnosis::{later}::")).collect();
-        let later: Vec<&str> = later.iter().map(String::as_str).collect();
-        forbid(&format!("crates/precut-calc/src/diagnosis/{folder}"), &later, &[]);
+fn each_folder_of_a_room_knows_those_before_it_alone() {
+    let diagnosis: &[&[&str]] = &[&["rows"], &["statistics"], &["causes"], &["verdict"], &["model"], &["answer"]];
+    let calculator: &[&[&str]] = &[&["job", "model"], &["answer"], &["measured"]];
+    for (room, order) in [
+        ("diagnosis", diagnosis),
+        ("deflection_compensation", calculator),
+        ("feed_schedule", calculator),
+        ("fixture_stability", calculator),
+        ("ring_roundness", calculator),
+        ("program_compensation", calculator),
+        ("milling_stability", calculator),
+    ] {
+        for (place, folders) in order.iter().enumerate() {
+            let later = order[place + 1..].iter().flat_map(|later| *later);
+            let later: Vec<String> =
+                later.flat_map(|later| [format!("{room}::{later}::"), format!("super::{later}::")]).collect();
+            for folder in folders.iter().map(|folder| format!("crates/precut-calc/src/{room}/{folder}")) {
+                if root().join(&folder).exists() {
+                    forbid_paths(&folder, &later);
+                }
+            }
+        }
+    }
+}
+
+/// Forbids paths, but for those to the words of an answer.
+fn forbid_paths(folder: &str, paths: &[String]) {
+    for file in sources(folder) {
+        let code = code(&file);
+        for path in paths {
+            let found = code.split(path.as_str()).skip(1).find(|rest| !rest.starts_with("output"));
+            assert!(
+                found.is_none(),
+                "{} uses {path}{}",
+                file.display(),
+                found.unwrap_or_default().lines().next().unwrap_or("")
+            );
+        }
     }
 }
 

@@ -7,69 +7,40 @@
 //! equilibrium at every station (`equilibrium`). The compensated command is explicit, because the
 //! wanted state has the nominal depth; the prediction for any command is implicit.
 //!
-//! The way of a job: `input` -> `check` -> `grid` (stations), `acting` (effects),
-//! `structure` (beam) -> `model` (opening over depth) -> `cut` -> `stage` (passes) ->
-//! `driven`: `toolpath` and what it gives and meets (`encounters`), `form`, `second_order`, `advice` -> `output`, `picture`.
-//! `forward` gives the same model to the diagnosis, `held` to a program that is there.
+//! The way of a job: `job` (`input` -> `check` -> `grid`: stations, `acting`: effects, `structure`: beam) -> `model`
+//! (`yielding`: opening over depth -> `cut` -> `stage`: passes, `chords`) -> `answer` (`driven`: `toolpath` and what it
+//! gives and meets; `advice`, `output`, `picture`). `measured` gives the same model to the diagnosis, `model/held` to a
+//! program that is there.
 
-mod acting;
-mod advice;
-mod auto;
-mod check;
-mod columns;
-mod consequence;
-mod cut;
-mod driven;
-mod encounters;
-mod equilibrium;
-mod extremes;
-mod fan;
-mod form;
-mod formula;
-mod forward;
-mod grid;
-mod held;
-mod hypotheses;
-mod input;
-mod laws;
-mod measurement;
+mod answer;
+mod job;
+mod measured;
 mod model;
-mod next_runs;
-mod output;
-mod picture;
-mod power_cut;
-mod regime;
-mod rehearsal;
-mod second_order;
-mod soundness;
-mod stage;
-mod structure;
-mod toolpath;
 
 pub use crate::diameters::{
     Aim, DeflectionCorrelation, DeflectionQuantity, DeflectionUncertainQuantity, GaugeUncertainty, Tolerance,
     Uncertainty,
 };
-pub use auto::Automatic;
-pub(crate) use check::EFFECT_CODES;
-pub(crate) use encounters::{Reach, chuck_in_the_way, met};
-pub(crate) use equilibrium::{Opening, engage};
-pub use form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
-pub use forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun, PreparedDeflection};
-pub(crate) use forward::{GAUGE_STEP_MM, Measure, QUANTITIES, RELATIVE_STEP, columns_of_runs, difference};
-pub(crate) use held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
-pub use input::{
+pub use answer::auto::Automatic;
+pub use answer::output::{
+    AddedSupport, ErrorFan, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares,
+    StationColumns, StatusCompensated, StatusUncompensated,
+};
+pub(crate) use job::check::EFFECT_CODES;
+pub(crate) use job::encounters::{Reach, chuck_in_the_way, met};
+pub use job::input::{
     Carriage, Cut, Detail, FeedDirection, Gravity, Include, IncludeMode, Job, Limits, MAX_STATIONS, Pass, PathSettings,
     ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support,
     Theory,
 };
-pub use measurement::DeflectionMeasurement;
-pub(crate) use measurement::{first, measured_diameters};
-pub(crate) use next_runs::longest_run;
-pub use output::{
-    AddedSupport, ErrorFan, OneMoreRest, OneStep, Outcome, PassOutcome, Path, PathZone, SecondOrder, Shares,
-    StationColumns, StatusCompensated, StatusUncompensated,
-};
+pub use measured::forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun, PreparedDeflection};
+pub(crate) use measured::forward::{GAUGE_STEP_MM, Measure, QUANTITIES, RELATIVE_STEP, columns_of_runs, difference};
+pub use measured::measurement::DeflectionMeasurement;
+pub(crate) use measured::measurement::{first, measured_diameters};
+pub(crate) use measured::next_runs::longest_run;
+pub(crate) use model::equilibrium::{Opening, engage};
+pub use model::form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
+pub(crate) use model::held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
@@ -81,13 +52,13 @@ use crate::force;
 use crate::shaft::places;
 use crate::turning::Proof;
 
-use acting::Acting;
-use advice::SeenAlong;
-use columns::{Errors, columns, uncertainty_um};
-use cut::one_step;
-use driven::{Driven, drive};
-use grid::{Grid, path_station_count, station_count};
-use stage::{Stage, all_cuts, in_reach};
+use answer::advice::SeenAlong;
+use answer::columns::{Errors, columns, uncertainty_um};
+use answer::driven::{Driven, drive};
+use job::acting::Acting;
+use job::grid::{Grid, path_station_count, station_count};
+use model::cut::one_step;
+use model::stage::{Stage, all_cuts, in_reach};
 
 const UM_PER_MM: f64 = 1e3;
 
@@ -152,8 +123,8 @@ impl Calculator for DeflectionCompensation {
             "/conformance/joint/probability",
         ],
         codes: CODES,
-        figures: picture::FIGURE_IDS,
-        tables: picture::TABLE_IDS,
+        figures: answer::picture::FIGURE_IDS,
+        tables: answer::picture::TABLE_IDS,
         program: Some(ProgramOrigin::Made),
     };
 
@@ -168,7 +139,7 @@ impl Calculator for DeflectionCompensation {
                 *z = places::settled(*z, &ends_mm);
             }
         }
-        job.path.chord_tolerance_um = Some(toolpath::chord_tolerance_um(job));
+        job.path.chord_tolerance_um = Some(model::chords::chord_tolerance_um(job));
         job.force.fill();
     }
 
@@ -178,7 +149,7 @@ impl Calculator for DeflectionCompensation {
         let passes = job.passes.len().max(1) as f64;
         // Measured: about 0.3 us per station and cut; each rest that opens and closes solves a contact problem anew.
         let contacts = job.supports.iter().filter(|s| !s.carries()).count() as f64;
-        let tried = (auto::SAMPLES * auto::cuts_tried(job)) as f64;
+        let tried = (answer::auto::SAMPLES * answer::auto::cuts_tried(job)) as f64;
         // Parts are cut again: some 10,000 of them, measured.
         let sure = if full && !job.tolerance.is_none() { 40_000.0 * passes * (1.0 + contacts) } else { 0.0 };
         let us = (stations * (passes + 1.0) + tried) * (0.5 + 1.5 * contacts) + sure;
@@ -195,15 +166,15 @@ impl Calculator for DeflectionCompensation {
     }
 
     fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
-        picture::figures(job, outcome)
+        answer::picture::figures(job, outcome)
     }
 
     fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
-        picture::tables(job, outcome)
+        answer::picture::tables(job, outcome)
     }
 
     fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
-        Some(toolpath::program(job, outcome))
+        Some(answer::toolpath::program(job, outcome))
     }
 }
 
@@ -213,13 +184,13 @@ const COMPLIANCE_ACCURACY: f64 = 1e-9;
 fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     crate::calculator::checkpoint(monitor)?;
     let asked = job;
-    let (job, included_automatically) = auto::settled(asked, monitor)?;
+    let (job, included_automatically) = answer::auto::settled(asked, monitor)?;
     let job = &*job;
     let grid = Grid::of(job);
     let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
     let mut of_passes = Vec::new();
     let mut look =
-        |grid: &Grid, stage: &Stage, number: usize| of_passes.extend(advice::of_pass(job, grid, stage, number));
+        |grid: &Grid, stage: &Stage, number: usize| of_passes.extend(answer::advice::of_pass(job, grid, stage, number));
     let (stage, passes, driven) = match job.detail {
         Detail::Profile => {
             let (mut stage, passes) = all_cuts(job, &grid, &acting, &mut look, monitor)?;
@@ -251,11 +222,11 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     (outcome.aim_shift_um, outcome.conformance, outcome.error_fan) = (sure.aim_um, sure.conformance, sure.fan);
     let uncertainty_um = uncertainty_um(job, &grid, &acting, &stage)?;
     let drawn = drawn.flatten();
-    let warnings = advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
-    let warnings = advice::with_earlier(warnings, of_passes);
+    let warnings = answer::advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
+    let warnings = answer::advice::with_earlier(warnings, of_passes);
     let seen_along = SeenAlong::of(&stage, &outcome.shares, &uncertainty_um);
     outcome.stations = columns(job, grid.z_mm, stage, errors, uncertainty_um);
-    let explanation = advice::explanation(job, &outcome, &seen_along);
+    let explanation = answer::advice::explanation(job, &outcome, &seen_along);
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
 }
@@ -265,7 +236,7 @@ struct Along {
     path: Path,
     produced_mm: Vec<Option<f64>>,
     after: Form,
-    drawn: Option<toolpath::Drawn>,
+    drawn: Option<answer::toolpath::Drawn>,
     proof: Option<Proof>,
     sure: Sure,
 }
@@ -335,26 +306,30 @@ impl Assembly<'_> {
             Some((path, after, proof)) => (Some(path), Some(after), proof),
             None => (None, None, None),
         };
-        let most_deflected = advice::most_deflected(stage);
-        let largest_mm = model::at(&stage.cut.y_mm, most_deflected).abs();
+        let most_deflected = answer::advice::most_deflected(stage);
+        let largest_mm = model::yielding::at(&stage.cut.y_mm, most_deflected).abs();
         Ok(Outcome {
             form_error_um: before.form_error_um,
             form_error_after_um: after.as_ref().and_then(|form| form.form_error_um),
             largest_error_um: largest(&before),
             largest_error_after_um: after.as_ref().and_then(largest),
-            cutting_time_min: regime::cutting_time_min(job, &stage.regime, &stage.step),
+            cutting_time_min: model::regime::cutting_time_min(job, &stage.regime, &stage.step),
             before,
             after,
             path,
             proof,
-            shares: advice::shares(job, grid, acting, stage, most_deflected)?,
-            second_order: if full { Some(second_order::second_order(job, grid, acting, stage)?) } else { None },
-            one_more_rest: if full { advice::one_more_rest(asked, grid, acting, stage, monitor)? } else { None },
+            shares: answer::advice::shares(job, grid, acting, stage, most_deflected)?,
+            second_order: if full { Some(model::second_order::second_order(job, grid, acting, stage)?) } else { None },
+            one_more_rest: if full {
+                answer::advice::one_more_rest(asked, grid, acting, stage, monitor)?
+            } else {
+                None
+            },
             included_automatically: Vec::new(),
             aim_shift_um: 0.0,
             conformance: None,
             error_fan: None,
-            critical_speed_rpm: if full { soundness::critical_speed_rpm(job, stage)? } else { None },
+            critical_speed_rpm: if full { model::soundness::critical_speed_rpm(job, stage)? } else { None },
             one_step: (full && job.compare_one_step && !stage.line.has_contacts())
                 .then(|| one_step(&stage.line, &stage.radii, &stage.cut, job.force.depth_exponent())),
             passes,
@@ -388,8 +363,8 @@ fn basis(job: &Job) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[
-        check::CODES,
-        check::EFFECT_CODES,
+        job::check::CODES,
+        job::check::EFFECT_CODES,
         diameters::CODES,
         certainty::DISTRIBUTION_CODES,
         certainty::QUANTITY_CODES,
@@ -410,16 +385,16 @@ const CODES: Codes = Codes {
         force::FAILURE_CODES,
     ],
     warnings: &[
-        advice::WARNING_CODES,
+        answer::advice::WARNING_CODES,
         diameters::WARNING_CODES,
-        soundness::WARNING_CODES,
-        second_order::WARNING_CODES,
+        model::soundness::WARNING_CODES,
+        model::second_order::WARNING_CODES,
         force::WARNING_CODES,
     ],
-    explanations: &[advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES],
+    explanations: &[answer::advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
     labels: &[
-        picture::LABEL_CODES,
+        answer::picture::LABEL_CODES,
         diameters::DOUBT_LABELS,
         certainty::picture::LABEL_CODES,
         crate::shaft::handles::LABEL_CODES,

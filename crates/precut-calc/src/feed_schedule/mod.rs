@@ -6,72 +6,34 @@
 //! program ([`crate::num::gp`]), solved to a certificate, with the price of every limit as its multiplier. A conflict
 //! is answered with a smallest set of limits that conflict and the least relaxation.
 //!
-//! The way of a job: `input`, `models`, `plan` -> `check`, `effects` -> `case` (zones with compliances and acting
-//! models) -> `program` (rows and sums with names) -> `solve` (once, over whole parts per edge, or by successive
-//! linearisation), or `infeasible` -> `assess`, `binding` -> `run` (comparison, trade-off) -> `output`, `picture`,
-//! `toolpath`, `advice`. `rule` is the source paper's method; `continuous` and `segments` find zones; `passes` finds
-//! the split into passes; `compensated` asks the deflection calculator for the path; `forward` gives the models to the
-//! diagnosis; `measurement`, `levels`, `hypotheses`, `design` and `next_runs` are what it brings to one. `fit` fits the models to trials.
+//! The way of a job: `job` (`input`, `models`, `plan` -> `check`, `effects` -> `case`: zones with compliances and acting
+//! models) -> `model` (`program`: rows and sums with names -> `solve`: once, over whole parts per edge, or by successive
+//! linearisation, or `infeasible` -> `assess`, `binding`) -> `answer` (`run`: comparison, trade-off -> `output`,
+//! `picture`, `toolpath`, `advice`). In `model`, `rule` is the source paper's method; `continuous` finds zones; `passes`
+//! finds the split into passes; `compensated` asks the deflection calculator for the path. `measured` gives the models to
+//! the diagnosis. `fit` fits the models to trials.
 
-mod acting;
-mod advice;
-mod assess;
-mod binding;
-mod blank;
-mod case;
-mod check;
-mod compensated;
-mod compliance;
-mod conditions;
-mod consequence;
-mod continuous;
-mod design;
-mod driven;
-mod dual;
-mod edges;
-mod effects;
+mod answer;
 pub mod fit;
-mod formula;
-mod forward;
-mod hypotheses;
-mod infeasible;
-mod input;
-mod levels;
-mod measurement;
-mod models;
-mod next_runs;
-mod output;
-mod passes;
-mod picture;
-mod plan;
-mod prices;
-mod program;
-mod remainder;
-mod risk;
-mod rule;
-mod run;
-mod scatter;
-mod segments;
-mod solve;
-pub(crate) mod stretches;
-mod toolpath;
-mod whole;
-mod words;
+mod job;
+mod measured;
+mod model;
 
-pub use forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
-pub use input::{
-    Coupling, CouplingTerm, CustomLimit, FeedMode, Goal, Job, Limits, MAX_ZONES, Machine, Reference, SpeedMode,
-    UsageScope, Variables, Zone,
-};
-pub use measurement::MachinabilityMeasurement;
-pub use models::{FurtherModel, Models, Output};
-pub use output::{
+pub use answer::output::{
     Binding, Certificate, ChangePlace, Comparison, CompensatedPath, ConstantFeed, Continuous, EdgeUse, EqualDeflection,
     Looser, NamedValue, NextWhole, Outcome, PassTrial, PassesOutcome, PathOfZone, Price, PriceBasis,
     ScheduleConformance, ScheduledLimitKept, SegmentTime, Solver, SurfaceUsage, ToolChange, TradePoint, ZoneOutcome,
 };
-pub use plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
-pub use risk::Risk;
+pub use job::input::{
+    Coupling, CouplingTerm, CustomLimit, FeedMode, Goal, Job, Limits, MAX_ZONES, Machine, Reference, SpeedMode,
+    UsageScope, Variables, Zone,
+};
+pub use job::models::{FurtherModel, Models, Output};
+pub use job::plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
+pub use measured::forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
+pub use measured::measurement::MachinabilityMeasurement;
+pub use model::risk::Risk;
+pub(crate) use model::stretches;
 
 use crate::calculator::{
     Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Place, Program,
@@ -83,15 +45,15 @@ use crate::{force, shaft};
 /// The geometric program of a checked and filled job, as its solver gets it: for other solvers and for measurements.
 /// Models that bend stand in it as their tangents at the middle of the bounds.
 pub fn geometric_program(job: &Job) -> Result<crate::num::gp::Program, Failure> {
-    let held = compliance::Held::of(job)?;
-    let case = case::Case::of(job, held.as_ref(), None)?;
-    Ok(program::build(&case, &program::Variation::default()).program)
+    let held = job::compliance::Held::of(job)?;
+    let case = job::case::Case::of(job, held.as_ref(), None)?;
+    Ok(model::program::build(&case, &model::program::Variation::default()).program)
 }
 
 /// Largest compliance of every zone by the beam, um/N; empty without a shaft.
 pub fn zone_compliances(job: &Job) -> Result<Vec<f64>, Failure> {
     let stretches: Vec<(f64, f64)> = job.zones.iter().map(|zone| (zone.z_start_mm, zone.z_end_mm)).collect();
-    Ok(compliance::Held::of(job)?.map(|held| held.largest(&stretches)).unwrap_or_default())
+    Ok(job::compliance::Held::of(job)?.map(|held| held.largest(&stretches)).unwrap_or_default())
 }
 
 /// The calculator.
@@ -154,8 +116,8 @@ impl Calculator for FeedSchedule {
         ],
         study_outputs: &["/objective", "/cutting_time_min", "/tool_usage", "/largest_deflection_um"],
         codes: CODES,
-        figures: picture::FIGURE_IDS,
-        tables: picture::TABLE_IDS,
+        figures: answer::picture::FIGURE_IDS,
+        tables: answer::picture::TABLE_IDS,
         program: Some(ProgramOrigin::Made),
     };
 
@@ -179,7 +141,7 @@ impl Calculator for FeedSchedule {
             force.fill();
         }
         let force = job.force.clone();
-        effects::fill(job);
+        job::effects::fill(job);
         job.models.fill(force.as_ref());
     }
 
@@ -218,35 +180,42 @@ impl Calculator for FeedSchedule {
             Risk::LeastCost { .. } => 12_000.0,
         };
         if job.limits.as_ref().is_some_and(|limits| limits.whole_edges) {
-            ms *= whole::programs(job.zones.len()) as f64 / 8.0;
+            ms *= model::whole::programs(job.zones.len()) as f64 / 8.0;
         }
         Cost { ms, bytes: 1_000_000 + job.zones.len() as u64 * 20_000, driver }
     }
 
     fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
-        run::run(job, monitor)
+        answer::run::run(job, monitor)
     }
 
     fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
-        picture::figures(job, outcome)
+        answer::picture::figures(job, outcome)
     }
 
     fn tables(job: &Job, outcome: &Outcome) -> Vec<Table> {
-        picture::tables(job, outcome)
+        answer::picture::tables(job, outcome)
     }
 
     fn program(job: &Job, outcome: &Outcome) -> Option<Result<Program, Failure>> {
-        Some(toolpath::program(job, outcome))
+        Some(answer::toolpath::program(job, outcome))
     }
 
     fn at_place(job: &Job, _outcome: &Outcome, place: &Place<'_>) -> Option<Job> {
-        picture::at_place(job, place)
+        answer::picture::at_place(job, place)
     }
 }
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, risk::CODES, effects::CODES, forward::CODES, shaft::check::CODES, force::FAULT_CODES],
+    faults: &[
+        job::check::CODES,
+        model::risk::CODES,
+        job::effects::CODES,
+        measured::forward::CODES,
+        shaft::check::CODES,
+        force::FAULT_CODES,
+    ],
     failures: &[
         &[
             "no_zones",
@@ -261,10 +230,10 @@ const CODES: Codes = Codes {
             "tool_hits_chuck",
         ],
         crate::turning::Proof::CODES,
-        risk::FAILURE_CODES,
+        model::risk::FAILURE_CODES,
     ],
-    warnings: &[advice::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES],
+    warnings: &[answer::advice::WARNING_CODES],
+    explanations: &[answer::advice::EXPLANATION_CODES],
     stages: &[&["stage_passes", "stage_continuous", "stage_segments", "stage_comparison", "stage_path", "stage_done"]],
-    labels: &[picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
+    labels: &[answer::picture::LABEL_CODES, crate::shaft::handles::LABEL_CODES],
 };

@@ -2,11 +2,11 @@
 
 use crate::calculator::Cost;
 
-use super::acting::Case;
-use super::input::{Analysis, FixtureJob};
-use super::probable_depths::{BOUNDARIES, LEAST_SPEEDS, scales};
-use super::simulate;
-use super::slow::{in_a_period, is_slow};
+use crate::fixture_stability::answer::probable_depths::{BOUNDARIES, LEAST_SPEEDS, scales};
+use crate::fixture_stability::job::acting::Case;
+use crate::fixture_stability::job::input::{Analysis, FixtureJob};
+use crate::fixture_stability::model::simulate;
+use crate::fixture_stability::model::slow::{in_a_period, is_slow};
 
 /// Oscillations in a tooth period from which on one Krylov space does not suffice for most multipliers, how their time then grows
 /// with them, and how much it is at most: that of all restarts. Measured with 20 to 540 oscillations.
@@ -94,13 +94,13 @@ impl<'a> Points<'a> {
 }
 
 /// Whether the probability is told although nobody asked for the analysis `certainty`.
-pub(super) fn tells_probability(case: &Case) -> bool {
+pub(in crate::fixture_stability) fn tells_probability(case: &Case) -> bool {
     Points::new(case).probability_ms() <= UNASKED_MS
 }
 
 /// Expected work. A step in time takes 12 ns (a plain vise, linear law) to 60 ns (joints that open, a power of the chip, kept
 /// steps), the most is taken, and 25 ns for every further tooth in cut.
-pub(super) fn cost(job: &FixtureJob) -> Cost {
+pub(in crate::fixture_stability) fn cost(job: &FixtureJob) -> Cost {
     let Some(case) = Case::of(job) else { return Cost { ms: 1.0, bytes: 100_000, driver: "/cut" } };
     let points = Points::new(&case);
     let phases = case.cutting.phases() as f64;

@@ -6,72 +6,45 @@
 //! motion linearised about it (`floquet`, `lobes`), and the cut in time with joints that open and teeth that leave the
 //! cut (`march`).
 //!
-//! The way of a job: `input` -> `check` -> `acting` (effects, numbers) -> `cutting` (teeth, force), `holding` (masses,
-//! springs) -> `answer` -> `output`, `advice`, `picture`. `forward` gives the same model to the diagnosis.
+//! The way of a job: `job` (`input` -> `check` -> `acting`: effects, numbers) -> `model` (`cutting`: teeth, force;
+//! `holding`: masses, springs) -> `answer` (`study` -> `output`, `advice`, `picture`). `measured` gives the same model to
+//! the diagnosis.
 
-mod acting;
-mod advice;
 mod answer;
-mod answering;
-mod check;
-mod clamp;
-mod conformance;
-mod consequence;
 mod cost;
-mod cutting;
-mod drive;
-mod floquet;
-mod forward;
-mod holding;
-mod hypotheses;
 pub mod identification;
-mod input;
-mod lobes;
-mod march;
-mod margins;
-mod measurement;
-mod next_runs;
-mod output;
-mod parts;
-mod picture;
-mod plausible;
-mod predict;
-mod probable_depths;
-mod response;
-mod settled;
-mod simulate;
-mod slip;
-mod slow;
-mod speeds;
-mod uncertain;
-pub(crate) mod usual_scatter;
-mod zeroth;
+mod job;
+mod measured;
+mod model;
 
-pub use conformance::FixtureConformance;
-pub use forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
-pub use input::{
-    Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, Friction, JawGrip, LimitSettings, LimitSpeed,
-    LobeSettings, MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle,
-    SpindlePoint, Vise, ViseJoint,
-};
-pub use measurement::{FixtureMeasurement, ObservedRegime};
-pub use output::{
+pub use answer::conformance::FixtureConformance;
+pub use answer::output::{
     AmplitudeCurve, ArcProfile, BetterSpeed, ChatterKind, ClampForce, CuttingDrive, DepthLimits, Engagement,
     FirstLimit, FixtureOutcome, FixtureState, FixtureVerdict, FloquetMultiplier, ForcedMotion, Histories, LobeBoundary,
     LobeDiagram, LobeMap, OpenJoint, Oscillogram, PushedAlong, QuasiStatic, Simulated, SlipForce, SpeedLimit,
     TextbookForce, VibrationMode, ZerothOrder,
 };
+pub use job::input::{
+    Analysis, ConstantForce, Entry, FaceMill, FeedToward, FixtureJob, Friction, JawGrip, LimitSettings, LimitSpeed,
+    LobeSettings, MAX_MAP_POINTS, MillingCut, MillingForce, Regeneration, SelfLocking, SimulationSettings, Spindle,
+    SpindlePoint, Vise, ViseJoint,
+};
+pub(crate) use job::usual_scatter;
+pub use measured::forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
+pub use measured::measurement::{FixtureMeasurement, ObservedRegime};
 
-pub(crate) use check::{check_characteristic, check_friction};
-pub(crate) use conformance::{WARNING_CODES as IMPROBABLE_CODES, quiet_to};
-pub(crate) use cutting::engagement_rad;
-pub(crate) use drive::power_kw;
-pub(crate) use input::FrictionRange;
-pub(crate) use plausible::{CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO};
-pub use probable_depths::{ProbableDepths, RobustSpeed};
-pub use uncertain::{FixtureCorrelation, FixtureQuantity, FixtureUncertainQuantity, FixtureUncertainty};
+pub(crate) use answer::conformance::{WARNING_CODES as IMPROBABLE_CODES, quiet_to};
+pub(crate) use answer::plausible::{
+    CLAMP, COEFFICIENT, DAMPING, EDGE, FEED, FREQUENCY, STATED_FREQUENCY, STATED_RATIO,
+};
+pub use answer::probable_depths::{ProbableDepths, RobustSpeed};
+pub(crate) use job::check::{check_characteristic, check_friction};
+pub(crate) use job::input::FrictionRange;
+pub use job::uncertain::{FixtureCorrelation, FixtureQuantity, FixtureUncertainQuantity, FixtureUncertainty};
+pub(crate) use model::cutting::engagement_rad;
+pub(crate) use model::drive::power_kw;
 
-pub use parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
+pub use answer::parts::{TimeRun, forced_motion, lobe_boundary, lobe_map, multiplier_modulus, run_in_time};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
@@ -80,8 +53,8 @@ use crate::calculator::{
 
 use crate::certainty::{DISTRIBUTION_CODES, MISSING_CODES, QUANTITY_CODES};
 
-use acting::Case;
-use answer::{Study, outcome};
+use answer::study::{Study, outcome};
+use job::acting::Case;
 
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
@@ -145,8 +118,8 @@ impl Calculator for FixtureStability {
             "/multiplier/modulus",
         ],
         codes: CODES,
-        figures: picture::FIGURE_IDS,
-        tables: picture::TABLE_IDS,
+        figures: answer::picture::FIGURE_IDS,
+        tables: answer::picture::TABLE_IDS,
         program: None,
     };
 
@@ -172,22 +145,22 @@ impl Calculator for FixtureStability {
         let case = Case::of(job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
         let study = Study::new(job, case, monitor)?;
         let (outcome, aside) = outcome(&study)?;
-        let warnings = advice::warnings(&study, &outcome, &aside);
-        let explanation = advice::explanation(&study, &outcome, &aside);
+        let warnings = answer::advice::warnings(&study, &outcome, &aside);
+        let explanation = answer::advice::explanation(&study, &outcome, &aside);
         monitor.progress(1.0, Message::new("stage_fixture_done"));
         Ok(Answer { output: outcome, warnings, explanation, basis: basis(job) })
     }
 
     fn figures(job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Figure> {
-        picture::figures(job, outcome)
+        answer::picture::figures(job, outcome)
     }
 
     fn tables(_job: &FixtureJob, outcome: &FixtureOutcome) -> Vec<Table> {
-        picture::tables(outcome)
+        answer::picture::tables(outcome)
     }
 
     fn at_place(job: &FixtureJob, _outcome: &FixtureOutcome, place: &Place<'_>) -> Option<FixtureJob> {
-        picture::at_place(job, place)
+        answer::picture::at_place(job, place)
     }
 }
 
@@ -206,7 +179,7 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
         Basis { equation: "fixture/5.5", source: "exact propagation between steps, joints by event" },
         Basis { equation: "fixture/5.6", source: "elastic and viscous force of the joints" },
     ];
-    let is_slow = |case: Case| slow::is_slow(&case.holding, &case.cutting, case.working.spindle_rpm);
+    let is_slow = |case: Case| model::slow::is_slow(&case.holding, &case.cutting, case.working.spindle_rpm);
     if Case::of(job).is_some_and(is_slow) {
         used.retain(|basis| basis.equation != "fixture/5.1" && basis.equation != "fixture/5.5");
         used.push(Basis { equation: "fixture/5.9", source: "adiabatic theorem on the equation without a delay" });
@@ -226,7 +199,7 @@ fn basis(job: &FixtureJob) -> Vec<Basis> {
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
     faults: &[
-        check::CODES,
+        job::check::CODES,
         DISTRIBUTION_CODES,
         QUANTITY_CODES,
         crate::certainty::open::CODES,
@@ -234,8 +207,12 @@ const CODES: Codes = Codes {
         &["time_missing", "opened_without_clamp_force"],
     ],
     failures: &[&["undamped_resonance"]],
-    warnings: &[advice::WARNING_CODES, conformance::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, probable_depths::EXPLANATION_CODES],
+    warnings: &[answer::advice::WARNING_CODES, answer::conformance::WARNING_CODES],
+    explanations: &[
+        answer::advice::EXPLANATION_CODES,
+        answer::conformance::EXPLANATION_CODES,
+        answer::probable_depths::EXPLANATION_CODES,
+    ],
     stages: &[&[
         "stage_simulation",
         "stage_clamp_force",
@@ -245,5 +222,5 @@ const CODES: Codes = Codes {
         "stage_certainty",
         "stage_fixture_done",
     ]],
-    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
+    labels: &[answer::picture::LABEL_CODES, answer::picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };

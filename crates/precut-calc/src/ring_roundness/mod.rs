@@ -5,63 +5,36 @@
 //! simulation (`turning`) locates the ring exactly at every step and cuts every body angle; the linear theory (`lobing`)
 //! says which waves grow, stay or decay; the reference circles are those of [`crate::num::roundness`].
 //!
-//! The way of a job: `input` -> `check` -> `scene` (setting and blank with effects, mirrored for clockwise rotation) ->
-//! `simulate`, `linear`, `search` -> `output`, `advice`, `picture`. `forward` gives the same model to the diagnosis.
+//! The way of a job: `job` (`input` -> `check`) -> `model` (`scene`: setting and blank with effects, mirrored for
+//! clockwise rotation -> `simulate`, `linear`, `search`) -> `answer` (`output`, `advice`, `picture`). `measured` gives the
+//! same model to the diagnosis.
 
-mod advice;
-mod causes;
-mod check;
-mod conformance;
-mod cut_force;
+mod answer;
 pub mod cylindricity;
-mod elsewhere;
 pub mod evaluation;
-mod forward;
-mod hypotheses;
-mod input;
-mod input_ranges;
-mod linear;
-mod lobing;
-mod map;
-mod measurement;
-mod next_runs;
-mod output;
-mod output_settings;
-mod picture;
-mod place;
-mod replay;
-mod sampling;
-mod scene;
-mod search;
-mod search_wide;
-mod simulate;
-mod softness;
-mod speeds;
-mod stance;
-mod surface;
-mod tables;
-mod turning;
-mod uncertain;
+mod job;
+mod measured;
+mod model;
 
-pub use conformance::RingConformance;
-pub use cut_force::{CutForce, ForceLaw};
-pub use forward::{RingAllowances, RingPoint, RingRun};
-pub use input::{
-    Analysis, Drive, Dynamics, ErrorEstimate, Forces, Job, LongWave, Method, Mode, ModePlace, ProfileRow, Ring,
-    RingTolerance, Rotation, Stiffness, Supports, Tool, Wave,
-};
-pub use input_ranges::{MapRange, SearchRange, SpeedRange};
-pub use measurement::RingMeasurement;
-pub use output::{
+pub use answer::conformance::RingConformance;
+pub use answer::output::{
     CauseKind, CauseOutcome, CausesOutcome, CircleValues, Evaluated, HistoryColumns, Outcome, PathColumns,
     ProfileColumns, ReactionsOutcome, ReplayFrame, ReplayOutcome, SettingOutcome, SimulationOutcome, SpectrumColumns,
     WaveColumn,
 };
-pub use output_settings::{
+pub use answer::output_settings::{
     CutCell, Fate, LinearOutcome, MapCell, MapOutcome, OrderOutcome, RootOutcome, SearchOutcome, SearchSetting,
     SearchStatus, SecondStage, SpeedCell, SpeedMapOutcome, TriedColumns,
 };
-pub use uncertain::{RingCorrelation, RingQuantity, RingUncertainQuantity, RingUncertainty};
+pub use job::cut_force::{CutForce, ForceLaw};
+pub use job::input::{
+    Analysis, Drive, Dynamics, ErrorEstimate, Forces, Job, LongWave, Method, Mode, ModePlace, ProfileRow, Ring,
+    RingTolerance, Rotation, Stiffness, Supports, Tool, Wave,
+};
+pub use job::input_ranges::{MapRange, SearchRange, SpeedRange};
+pub use job::uncertain::{RingCorrelation, RingQuantity, RingUncertainQuantity, RingUncertainty};
+pub use measured::forward::{RingAllowances, RingPoint, RingRun};
+pub use measured::measurement::RingMeasurement;
 
 use crate::certainty::{DISTRIBUTION_CODES, MISSING_CODES, QUANTITY_CODES};
 
@@ -70,10 +43,10 @@ use crate::calculator::{
     Monitor, Place, Table, checkpoint,
 };
 
-use scene::Scene;
-use simulate::Share;
-use stance::{Load, Stance, reactions_n};
-use surface::UM_PER_MM;
+use model::scene::Scene;
+use model::simulate::Share;
+use model::stance::{Load, Stance, reactions_n};
+use model::surface::UM_PER_MM;
 
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
@@ -157,13 +130,13 @@ impl Calculator for RingRoundness {
             "/conformance/joint/probability",
         ],
         codes: CODES,
-        figures: picture::FIGURE_IDS,
-        tables: tables::TABLE_IDS,
+        figures: answer::picture::FIGURE_IDS,
+        tables: answer::tables::TABLE_IDS,
         program: None,
     };
 
     fn fill(job: &mut Job) {
-        job.samples = Some(sampling::samples_of(job));
+        job.samples = Some(job::sampling::samples_of(job));
     }
 
     fn cost(job: &Job) -> Cost {
@@ -175,15 +148,15 @@ impl Calculator for RingRoundness {
     }
 
     fn figures(job: &Job, outcome: &Outcome) -> Vec<Figure> {
-        picture::figures(job, outcome)
+        answer::picture::figures(job, outcome)
     }
 
     fn tables(_job: &Job, outcome: &Outcome) -> Vec<Table> {
-        tables::tables(outcome)
+        answer::tables::tables(outcome)
     }
 
     fn at_place(job: &Job, outcome: &Outcome, place: &Place<'_>) -> Option<Job> {
-        elsewhere::at_place(job, outcome, place)
+        answer::elsewhere::at_place(job, outcome, place)
     }
 }
 
@@ -200,7 +173,7 @@ struct Work {
 /// Measured on one core: 60 to 110 ns per step, rollers 0.3 to 0.5 us, the paper's algorithm 6 ns per step and point,
 /// a map's cell 30 us.
 fn work(job: &Job) -> Work {
-    let n = f64::from(sampling::samples_of(job));
+    let n = f64::from(job::sampling::samples_of(job));
     let turns = job.tool.revolutions + job.tool.spark_out_revolutions;
     let step_ns = if job.supports.roller_radius_mm > 0.0 { 400.0 } else { 90.0 };
     let mut work = Work { simulation: 0.0, theory: 0.0, speeds: 0.0, map: 0.0, search: 0.0, certainty: 0.0 };
@@ -214,8 +187,8 @@ fn work(job: &Job) -> Work {
             Method::NearestSamples => 7.0 * n * n + 3600.0 * step_ns,
         };
         // The causes: one run with everything, one with each term off, one of them with twice the revolutions, one with more.
-        let terms = 7.0 + causes::MOST_LONGER + job.effects.len() as f64;
-        let per_turn = per_turn + terms * f64::from(causes::nodes(job)) * step_ns;
+        let terms = 7.0 + model::causes::MOST_LONGER + job.effects.len() as f64;
+        let per_turn = per_turn + terms * f64::from(model::causes::nodes(job)) * step_ns;
         // The history fits a circle per entry.
         work.simulation = 1e-6 * turns * per_turn + 3e-5 * n * turns.min(400.0) + 1e-3 * n;
     }
@@ -223,7 +196,7 @@ fn work(job: &Job) -> Work {
         work.theory = 5.0;
     }
     if job.asks(Analysis::SpeedMap) {
-        work.speeds = speeds::work_ms(job);
+        work.speeds = model::speeds::work_ms(job);
     }
     if job.asks(Analysis::SetupMap) {
         let cells = f64::from(job.setup_map.tool_angles) * f64::from(job.setup_map.support_angles);
@@ -236,23 +209,23 @@ fn work(job: &Job) -> Work {
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
         let nodes = if job.filter == LongWave::None { n } else { n.min(1800.0) };
-        let expected = search::expected(job, range);
+        let expected = model::search::expected(job, range);
         // A scan in steps of 5 % sums to 21 times its largest run.
         work.search = 1e-6 * step_ns * (21.0 * nodes + 6.0 * n) * expected.revolutions;
         if expected.is_wide {
-            work.search += search_wide::work_ms(job, range, step_ns);
+            work.search += model::search_wide::work_ms(job, range, step_ns);
         }
     }
     if job.asks(Analysis::Certainty) {
-        work.certainty = 1e-6 * conformance::RINGS * turns * f64::from(causes::nodes(job)) * step_ns;
+        work.certainty = 1e-6 * answer::conformance::RINGS * turns * f64::from(model::causes::nodes(job)) * step_ns;
     }
     work
 }
 
 fn cost(job: &Job) -> Cost {
-    let job = &*cut_force::resolved(job);
+    let job = &*job::cut_force::resolved(job);
     let work = work(job);
-    let samples = sampling::samples_of(job);
+    let samples = job::sampling::samples_of(job);
     let mut ms = 1.0 + work.simulation + work.theory;
     let mut driver = if samples > 7200 { "/samples" } else { "/tool/revolutions" };
     for (part, field) in [
@@ -267,15 +240,15 @@ fn cost(job: &Job) -> Cost {
         ms += part;
     }
     let rows = job.measured_profile.as_ref().map_or(0, |profile| profile.rows().len());
-    let frames = u64::from(job.replay_frames) * replay::MOST_POINTS * 16;
+    let frames = u64::from(job.replay_frames) * model::replay::MOST_POINTS * 16;
     let bytes = 200_000 + u64::from(samples) * 400 + rows as u64 * 100 + frames;
     Cost { ms, bytes, driver }
 }
 
 fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     checkpoint(monitor)?;
-    let cut_force = cut_force::of(job);
-    let job = &*cut_force::resolved(job);
+    let cut_force = job::cut_force::of(job);
+    let job = &*job::cut_force::resolved(job);
     let scene = Scene::of(job, &job.effects);
     let end = scene.end().ok_or_else(|| Failure::OutOfModel(Finding::new("no_end_position", "/tool")))?;
     let mut outcome = Outcome {
@@ -302,7 +275,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let mapped = sped + work.map;
     let [simulated, sped, mapped, searched] = [work.simulation, sped, mapped, mapped + work.search].map(after);
     if job.asks(Analysis::Simulation) {
-        let simulated = simulate::simulate(job, &scene, &end, whole.part(0.0, simulated))?;
+        let simulated = model::simulate::simulate(job, &scene, &end, whole.part(0.0, simulated))?;
         if let (Some(end), Some(error)) = (&simulated.end, &simulated.end_error) {
             outcome.roundness_um = Some(end.filtered.least_squares_um);
             outcome.roundness_error_um = Some(error.filtered.least_squares_um);
@@ -314,26 +287,26 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         outcome.simulation = Some(simulated);
     }
     if job.asks(Analysis::LinearTheory) {
-        outcome.linear_theory = Some(linear::theory(job, &scene, &end));
+        outcome.linear_theory = Some(model::linear::theory(job, &scene, &end));
     }
     if job.asks(Analysis::SpeedMap) {
-        outcome.speed_map = Some(speeds::map(job, &scene, &end, whole.part(simulated, sped))?);
+        outcome.speed_map = Some(model::speeds::map(job, &scene, &end, whole.part(simulated, sped))?);
     }
     if job.asks(Analysis::SetupMap) {
-        outcome.setup_map = Some(map::map(job, &scene, &end, whole.part(sped, mapped))?);
+        outcome.setup_map = Some(answer::map::map(job, &scene, &end, whole.part(sped, mapped))?);
     }
     if let (true, Some(range)) = (job.asks(Analysis::SettingsSearch), &job.settings_search) {
-        outcome.settings_search = Some(search::search(job, range, &scene, whole.part(mapped, searched))?);
+        outcome.settings_search = Some(model::search::search(job, range, &scene, whole.part(mapped, searched))?);
     }
     if let (true, Some(tolerance)) = (job.asks(Analysis::Certainty), &job.tolerance) {
         let share = whole.part(searched, 1.0);
-        outcome.conformance = Some(conformance::conformance(job, &scene, &end, tolerance.roundness_um, share)?);
+        outcome.conformance = Some(answer::conformance::conformance(job, &scene, &end, tolerance.roundness_um, share)?);
     }
-    let mut warnings = advice::warnings(job, &scene, &end, &outcome);
-    let mut explanation = advice::explanation(job, &scene, &end, &outcome);
+    let mut warnings = answer::advice::warnings(job, &scene, &end, &outcome);
+    let mut explanation = answer::advice::explanation(job, &scene, &end, &outcome);
     if let Some(found) = &outcome.conformance {
-        warnings.extend(conformance::warning(found));
-        explanation.insert(0, conformance::said(found));
+        warnings.extend(answer::conformance::warning(found));
+        explanation.insert(0, answer::conformance::said(found));
     }
     monitor.progress(1.0, Message::new("stage_done"));
     Ok(Answer { basis: basis(job, &outcome), output: outcome, warnings, explanation })
@@ -351,7 +324,7 @@ fn setting(job: &Job, scene: &Scene, end: &Stance) -> Result<SettingOutcome, Fai
     Ok(SettingOutcome {
         circumradius_mm: end.radius_mm,
         support_half_angle_deg: end.half_angle_rad.to_degrees(),
-        tool_angle_deg: scene::mirrored_rad(end.tool_rad(), scene.mirrored).to_degrees(),
+        tool_angle_deg: model::scene::mirrored_rad(end.tool_rad(), scene.mirrored).to_degrees(),
         coefficient_a: a,
         coefficient_b: b,
         coefficient_sum: copying.gain(),
@@ -360,7 +333,7 @@ fn setting(job: &Job, scene: &Scene, end: &Stance) -> Result<SettingOutcome, Fai
         compliance_ratio: scene.setting.compliance_ratio,
         radius_per_feed: per_feed,
         half_turn_reduction_um: per_feed * scene.setting.feed_mm_per_rev * UM_PER_MM,
-        gap_at_start_um: simulate::gap_at_start_mm(job, scene)? * UM_PER_MM,
+        gap_at_start_um: model::simulate::gap_at_start_mm(job, scene)? * UM_PER_MM,
         cut_force: None,
         reactions: job.forces.as_ref().map(|forces| reactions(forces, scene, end)),
     })
@@ -433,10 +406,10 @@ fn basis(job: &Job, outcome: &Outcome) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[check::CODES, DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES, crate::certainty::open::CODES],
-    failures: &[simulate::FAILURE_CODES, &["no_end_position"]],
-    warnings: &[advice::WARNING_CODES, conformance::WARNING_CODES],
-    explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES],
+    faults: &[job::check::CODES, DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES, crate::certainty::open::CODES],
+    failures: &[model::simulate::FAILURE_CODES, &["no_end_position"]],
+    warnings: &[answer::advice::WARNING_CODES, answer::conformance::WARNING_CODES],
+    explanations: &[answer::advice::EXPLANATION_CODES, answer::conformance::EXPLANATION_CODES],
     stages: &[&[
         "stage_revolution",
         "stage_speed_map",
@@ -446,5 +419,5 @@ const CODES: Codes = Codes {
         "stage_roundness_certainty",
         "stage_done",
     ]],
-    labels: &[picture::LABEL_CODES, picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
+    labels: &[answer::picture::LABEL_CODES, answer::picture::DOUBT_LABELS, crate::certainty::picture::LABEL_CODES],
 };

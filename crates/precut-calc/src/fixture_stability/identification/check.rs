@@ -2,10 +2,10 @@
 
 use crate::calculator::{Check, Finding, Violations};
 
-use super::super::cutting::engagement_rad;
-use super::super::input::Vise;
 use super::input::IdentificationJob;
 use super::unknowns::{Parameter, Unknown};
+use crate::fixture_stability::job::input::Vise;
+use crate::fixture_stability::model::cutting::engagement_rad;
 
 /// Codes of the faults found here, and those that fields name for their range.
 pub(super) const CODES: &[&str] = &[

@@ -8,7 +8,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{Measured, MeasuredRow};
 
-use super::super::input::{FeedToward, MillingForce, Regeneration, Vise};
+use crate::fixture_stability::job::input::{FeedToward, MillingForce, Regeneration, Vise};
 
 /// Most rows of a table.
 pub const MAX_ROWS: usize = 400;

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::super::input::{MillingForce, Regeneration, Vise};
 use super::input::{AmplitudeMeaning, OpenedJoint};
+use crate::fixture_stability::job::input::{MillingForce, Regeneration, Vise};
 
 /// Parameters found, and what they are worth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

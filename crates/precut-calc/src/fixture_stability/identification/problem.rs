@@ -8,16 +8,16 @@ use rayon::prelude::*;
 
 use crate::calculator::{Failure, Monitor};
 
-use super::super::cutting::Cutting;
-use super::super::floquet::Working;
-use super::super::holding::Holding;
-use super::super::input::Regeneration;
-use super::super::lobes::{Rules, by_states, moduli};
-use super::super::march::{Plan, Surface, march};
-use super::super::response::{Range, Response, response};
-use super::super::simulate::count;
 use super::input::{AmplitudeMeaning, IdentificationJob};
 use super::unknowns::{Unknown, Values};
+use crate::fixture_stability::job::input::Regeneration;
+use crate::fixture_stability::model::cutting::Cutting;
+use crate::fixture_stability::model::floquet::Working;
+use crate::fixture_stability::model::holding::Holding;
+use crate::fixture_stability::model::lobes::{Rules, by_states, moduli};
+use crate::fixture_stability::model::march::{Plan, Surface, march};
+use crate::fixture_stability::model::response::{Range, Response, response};
+use crate::fixture_stability::model::simulate::count;
 
 /// Residual up to which it counts by its square, beyond by its size (Huber).
 pub(super) const HUBER: f64 = 3.0;

@@ -3,8 +3,6 @@
 use crate::calculator::{Failure, checkpoint};
 use crate::num::stats::GENERATOR;
 
-use super::super::input::Vise;
-use super::super::lobes::critical_depth;
 use super::certainty::Certainty;
 use super::input::{IdentificationJob, OpenedJoint};
 use super::output::{
@@ -14,6 +12,8 @@ use super::output::{
 use super::problem::{Law, Predicted, Problem, huber, onset_mm};
 use super::search::Found;
 use super::unknowns::{Unknown, Values};
+use crate::fixture_stability::job::input::Vise;
+use crate::fixture_stability::model::lobes::critical_depth;
 
 const UM_PER_MM: f64 = 1e3;
 /// Standard deviations of a 95 % interval.

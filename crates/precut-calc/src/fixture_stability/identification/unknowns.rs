@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::super::cutting::{Cutting, engagement_rad};
-use super::super::holding::{Holding, Jaw, Joint, MM_PER_S2};
-use super::super::input::{ConstantForce, FeedToward, MillingForce, SelfLocking, Vise, ViseJoint};
 use super::input::{IdentificationJob, Unknowns};
+use crate::fixture_stability::job::input::{ConstantForce, FeedToward, MillingForce, SelfLocking, Vise, ViseJoint};
+use crate::fixture_stability::model::cutting::{Cutting, engagement_rad};
+use crate::fixture_stability::model::holding::{Holding, Jaw, Joint, MM_PER_S2};
 
 /// A parameter that may be found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

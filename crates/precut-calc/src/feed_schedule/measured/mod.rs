@@ -1,0 +1,11 @@
+//! What a diagnosis needs: the forward model, causes, consequences, next runs.
+
+pub(super) mod conditions;
+pub(super) mod consequence;
+pub(super) mod design;
+pub(super) mod forward;
+pub(super) mod hypotheses;
+pub(super) mod levels;
+pub(super) mod measurement;
+pub(super) mod next_runs;
+pub(super) mod remainder;
