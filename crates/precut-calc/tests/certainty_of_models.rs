@@ -100,7 +100,7 @@ fn shafts_of_a_posterior_are_good_as_often_as_said() {
     ]);
     // A headstock that is softer goes with a force that is smaller, as rows along a shaft leave it open.
     let open = open(&[
-        &[by(1, "delta_um_per_n", 0.02), by(2, "delta", -0.07)],
+        &[by(1, "delta_um_per_n", 0.012), by(2, "delta", -0.07)],
         &[by(2, "delta", 0.06)],
         &[by(3, "offset_um", 1.0)],
     ]);
@@ -113,13 +113,13 @@ fn shafts_of_a_posterior_are_good_as_often_as_said() {
     }
 }
 
-/// What has no name is a list of places, which is one quantity.
+/// What has no name is a list of places, which is one quantity; the shaft is looked at in its corners, too.
 #[test]
 fn shafts_of_a_profile_are_good_as_often_as_said() {
     let point = |z_mm: f64, error_um: f64| json!({ "z_mm": z_mm, "error_um": error_um });
     let effects = json!([
         { "kind": "size_offset", "offset_um": 1.0 },
-        { "kind": "remainder", "profile": [point(0.0, 1.0), point(200.0, -2.0), point(400.0, 2.5), point(600.0, 0.0)] }
+        { "kind": "remainder", "profile": [point(0.0, 1.0), point(180.0, -2.0), point(420.0, 2.5), point(600.0, 0.0)] }
     ]);
     let at = |place: u32| format!("profile/{place}/error_um");
     let direction = |of: [f64; 4], offset: f64| -> Vec<Value> {
@@ -171,6 +171,27 @@ fn what_is_told_replaces_what_is_usual() {
     assert!((with - before).abs() > 1e-3, "{with} {before}");
     // Without width it tells nothing, and all is as it was.
     assert_eq!(contributions(&open(&[&[by(1, "delta_um_per_n", 0.0)]])), (usual, before));
+}
+
+/// What is not known of the effects is in the uncertainty of the diameter along the shaft, by the cut itself.
+#[test]
+fn the_uncertainty_along_the_shaft_is_that_of_the_effects() {
+    let effects =
+        json!([{ "kind": "headstock_compliance", "delta_um_per_n": 0.03 }, { "kind": "force_level", "delta": 0.1 }]);
+    // So little that what is not straight in it is a millionth of it.
+    let open = open(&[&[by(1, "delta_um_per_n", 2e-4), by(2, "delta", -1e-3)], &[by(2, "delta", 5e-4)]]);
+    let mut job = shaft(&effects, &open, &json!({ "diameter_um": 10.0 }));
+    let told = solved(job.clone()).stations;
+    job.as_object_mut().unwrap().remove("uncertainty");
+    let mut at = |scores: [f64; 2]| {
+        job["effects"] = off(&effects, &open, &scores);
+        cut_with(&job, &told.z_mm, &told.commanded_diameter_mm)
+    };
+    let [up, down, up_more, down_more] = [at([1.0, 0.0]), at([-1.0, 0.0]), at([0.0, 1.0]), at([0.0, -1.0])];
+    for (i, found) in told.diameter_uncertainty_um.unwrap().into_iter().enumerate() {
+        let expected = (0.5 * (up[i] - down[i])).hypot(0.5 * (up_more[i] - down_more[i]));
+        assert!((found - expected).abs() < 1e-3 * expected + 1e-6, "{i}: {found} {expected}");
+    }
 }
 
 #[test]
