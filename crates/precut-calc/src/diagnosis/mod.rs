@@ -51,7 +51,7 @@ pub use causes::profile::Profile;
 pub use causes::ranking::SetWeight;
 pub use causes::subject::{Setting, Subject};
 pub use input::{DiagnosisJob, DiagnosisOptions, MAX_RUNS, PriorWeight};
-pub use model::downstream::{DecisionReport, DownstreamReport};
+pub use model::downstream::{DecisionReport, DownstreamReport, GoodPartsReport, ProbablyGood};
 pub use model::extension::ExtensionKind;
 pub use model::gain::{Gain, gain};
 pub use model::known::Known;

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
+    TellingRun, ToldEffects, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::diameters::{Aim, Tolerance};
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint, JointUncertainty};
@@ -20,7 +20,7 @@ use crate::deflection_compensation::job::check::outside_shaft;
 use crate::deflection_compensation::job::grid::{Grid, interpolate};
 use crate::deflection_compensation::job::input::{FeedDirection, IncludeMode, Job, Stations, Theory};
 use crate::deflection_compensation::job::structure::{Structure, Variant};
-use crate::deflection_compensation::measured::consequence::{compensated, consequences, corners};
+use crate::deflection_compensation::measured::consequence::{compensated, consequences, corners, parts_kept};
 use crate::deflection_compensation::measured::hypotheses::{
     Experiment, chuck_scale_n_mm_per_rad, design, remainder_name,
 };
@@ -441,6 +441,19 @@ impl Diagnosable for DeflectionCompensation {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
         consequences(job, runs, believed, acting, monitor)
+    }
+
+    const PARTS_DRAWN: usize = 500;
+
+    fn parts_kept(
+        job: &Job,
+        runs: &[DeflectionRun],
+        believed: &[DeflectionEffect],
+        acting: &[Vec<DeflectionEffect>],
+        told: &ToldEffects<'_, DeflectionEffect>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<bool>>, Failure> {
+        parts_kept(job, runs, believed, acting, told, monitor)
     }
 
     fn from_other_end(job: &Job, point: &DeflectionPoint) -> Option<DeflectionPoint> {
