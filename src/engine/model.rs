@@ -22,6 +22,8 @@ const MODEL: &str = "model";
 const EFFECTS: &str = "effects";
 /// The field of a diagnosis, and of what a model says of its origin, that tells how unsure effects are.
 pub(super) const UNCERTAINTY: &str = "effects_uncertainty";
+/// The fields of a job that say the same of its own effects: a block, and the list in it.
+const DOUBT: &str = "uncertainty";
 /// The field that holds the base job of a diagnosis or a study.
 const JOB: &str = "job";
 /// The field by which a diagnosis or a study names the calculator of its base job.
@@ -107,6 +109,8 @@ struct Places {
     /// Fields that lead to the object with the effects.
     effects: Vec<&'static str>,
     calculator: String,
+    /// Whether the object with the effects says what is not known of them.
+    takes_open_effects: bool,
 }
 
 /// `None` where this job cannot name one.
@@ -125,8 +129,19 @@ fn places(registry: &Registry, entry: &Entry, job: &Value) -> Option<Places> {
 fn places_in(entry: &Entry, job: &Value) -> Option<Places> {
     match entry.model_use() {
         ModelUse::None | ModelUse::Within => None,
-        ModelUse::OfJob => Some(Places { model: vec![], effects: vec![], calculator: entry.meta().id.to_owned() }),
-        ModelUse::OfBase => Some(Places { model: vec![], effects: vec![JOB], calculator: of_base(job)?.to_owned() }),
+        ModelUse::OfJob => Some(Places {
+            model: vec![],
+            effects: vec![],
+            calculator: entry.meta().id.to_owned(),
+            takes_open_effects: entry.takes_open_effects(),
+        }),
+        // A diagnosis is told itself, beside its base job.
+        ModelUse::OfBase => Some(Places {
+            model: vec![],
+            effects: vec![JOB],
+            calculator: of_base(job)?.to_owned(),
+            takes_open_effects: false,
+        }),
     }
 }
 
@@ -233,9 +248,14 @@ fn extend_with(found: &Found, places: Option<Places>, job: &mut Value) -> Vec<Fi
         Ok(before) => {
             if let Some(fields) = within(job, &places.model) {
                 fields.insert(MODEL.to_owned(), json!(held));
-                // Only a diagnosis, whose base job is inside it, asks how unsure effects are.
+                // A diagnosis has its base job inside it.
                 if places.effects.len() > places.model.len() {
-                    tell(fields, unsure, before);
+                    tell(fields, UNCERTAINTY, unsure, before);
+                } else if places.takes_open_effects && !unsure.is_empty() {
+                    // What is no object is the schema's to refuse.
+                    if let Value::Object(doubt) = fields.entry(DOUBT).or_insert_with(|| json!({})) {
+                        tell(doubt, EFFECTS, unsure, before);
+                    }
                 }
             }
             Vec::new()
@@ -258,8 +278,8 @@ fn kind(effect: &Value) -> Option<&str> {
     effect.get("kind")?.as_str()
 }
 
-/// Appends how unsure the effects of the model are, which stand behind so many others.
-fn tell(diagnosis: &mut Map<String, Value>, unsure: Vec<JointUncertainty>, before: usize) {
+/// Appends how unsure the effects of the model are, which stand behind so many others, to a list.
+fn tell(fields: &mut Map<String, Value>, list: &str, unsure: Vec<JointUncertainty>, before: usize) {
     let behind = |own: ParameterMove| ParameterMove {
         effect: own.effect.saturating_add(u32::try_from(before).unwrap_or(u32::MAX)),
         ..own
@@ -267,7 +287,7 @@ fn tell(diagnosis: &mut Map<String, Value>, unsure: Vec<JointUncertainty>, befor
     let moved =
         unsure.into_iter().map(|entry| json!({ "moves": entry.moves.into_iter().map(behind).collect::<Vec<_>>() }));
     // What is no list is the schema's to refuse.
-    if let Value::Array(stated) = diagnosis.entry(UNCERTAINTY).or_insert_with(|| json!([])) {
+    if let Value::Array(stated) = fields.entry(list).or_insert_with(|| json!([])) {
         stated.extend(moved);
     }
 }
@@ -361,7 +381,17 @@ pub(crate) fn base(entry: &Entry, job: &Value, held: &Held) -> Option<Prepared> 
     let mut job = job.clone();
     let effects = job.get_mut(EFFECTS)?.as_array_mut()?;
     effects.truncate(effects.len().saturating_sub(held.effects));
+    let left = effects.len();
+    if let Some(open) = job.get_mut(DOUBT).and_then(|doubt| doubt.get_mut(EFFECTS)).and_then(Value::as_array_mut) {
+        open.retain(|entry| is_of_first(entry, left));
+    }
     entry.prepare(&job).ok()
+}
+
+/// Whether all that an entry of what is not known tells of is among the first effects.
+fn is_of_first(entry: &Value, effects: usize) -> bool {
+    let own = serde_json::from_value::<JointUncertainty>(entry.clone());
+    own.is_ok_and(|own| own.moves.iter().all(|own| own.effect as usize <= effects))
 }
 
 /// Digits in which numbers with and without a model are told.

@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use precut_calc::calculator::{
-    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, Message, Meta, Monitor, Place,
-    Program, ReturnedProgram, Table, Violations, Watched,
+    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel, Message, Meta,
+    Monitor, Place, Program, ReturnedProgram, Table, Violations, Watched,
 };
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
 use serde::Deserialize;
@@ -43,6 +43,8 @@ pub struct Entry {
     calculation: Box<dyn Calculation>,
     composed: bool,
     model_use: ModelUse,
+    /// Whether a job says what is not known of its effects.
+    takes_open_effects: bool,
     /// Of a calculator whose process can be watched.
     observed: Option<Observed>,
     /// Bytes of the answer written last.
@@ -115,9 +117,9 @@ impl Entry {
     }
 
     /// The entry of a calculator whose jobs may name a stored model.
-    pub(super) fn with_model<C: Calculator>() -> Result<Self, RegistryError> {
+    pub(super) fn with_model<C: Calculator + ForwardModel>() -> Result<Self, RegistryError> {
         let entry = Self::with_input::<C>(contract::of::<C::Input>(C::META.id, true, family::offer_model))?;
-        Ok(Self { model_use: ModelUse::OfJob, ..entry })
+        Ok(Self { model_use: ModelUse::OfJob, takes_open_effects: C::TAKES_OPEN_EFFECTS, ..entry })
     }
 
     /// The same with its process.
@@ -196,6 +198,7 @@ impl Entry {
             calculation,
             composed: false,
             model_use: ModelUse::None,
+            takes_open_effects: false,
             observed: None,
             answer_bytes: AtomicUsize::new(0),
         }
@@ -423,6 +426,10 @@ impl Entry {
     /// Whether a job may name a stored model.
     pub(crate) fn model_use(&self) -> ModelUse {
         self.model_use
+    }
+    /// Whether a job says what is not known of its effects, in `uncertainty.effects`.
+    pub(crate) fn takes_open_effects(&self) -> bool {
+        self.takes_open_effects
     }
     /// Whether it is made of other entries' jobs: reading one is work, and running one waits for the store.
     pub(crate) fn is_composed(&self) -> bool {

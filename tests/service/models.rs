@@ -217,6 +217,49 @@ async fn what_a_stored_model_holds_is_found_changed_and_replaced() {
     assert_eq!(again["result"]["verdict"], "adequate", "{}", again["result"]["named"]);
 }
 
+/// What a diagnosis left open of a model is in the doubt about the parts that are made with it, in place of what is usual.
+#[tokio::test]
+async fn what_a_stored_model_leaves_open_is_in_the_probability_of_a_good_part() {
+    let server = server().await;
+    let open =
+        |effect: u32, by: f64| json!({ "moves": [{ "effect": effect, "parameter": "delta_um_per_n", "by": by }] });
+    let mut model = lathe(0.022, 0.020, 0.024);
+    assert_eq!(put(&server, "sure", &model).await, 201);
+    model["provenance"]["effects_uncertainty"] = json!([open(1, 0.004)]);
+    assert_eq!(put(&server, "unsure", &model).await, 201);
+
+    let example = include_str!("../../crates/precut-calc/src/deflection_compensation/examples/paper.json");
+    let mut job: Value = serde_json::from_str(example).unwrap();
+    job["tolerance"] = json!({ "diameter_um": 30.0 });
+    // Stated beside the model: its effects come behind.
+    job["effects"] = json!([{ "kind": "guideway_bow", "bow_um": 0.5 }]);
+    job["model"] = json!("unsure");
+    let answer: Value =
+        server.post_to("/v1/deflection-compensation", job.to_string()).send().await.unwrap().json().await.unwrap();
+    assert_eq!(answer["input"]["uncertainty"]["effects"], json!([open(2, 0.004)]));
+    let quantities = |answer: &Value| -> Vec<String> {
+        let all = answer["result"]["conformance"]["contributions"].as_array().unwrap();
+        let mut names: Vec<String> = all.iter().map(|one| one["quantity"].as_str().unwrap().to_owned()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(quantities(&answer), ["force", "model:headstock_compliance/delta_um_per_n", "tool_setting"]);
+
+    job["model"] = json!("sure");
+    let sure: Value =
+        server.post_to("/v1/deflection-compensation", job.to_string()).send().await.unwrap().json().await.unwrap();
+    assert_eq!(quantities(&sure), ["force", "stiffness", "tool_setting"]);
+
+    // Nothing is counted twice.
+    job["model"] = json!("unsure");
+    let width = json!({ "kind": "lognormal", "log_standard_deviation": 0.1 });
+    job["uncertainty"] = json!({ "quantities": [{ "quantity": "headstock_compliance", "distribution": width }] });
+    let response = server.post_to("/v1/deflection-compensation", job.to_string()).send().await.unwrap();
+    let refused = problem(response, 422, "invalid_job").await;
+    assert_eq!(refused["errors"][0]["code"], "duplicate_quantity");
+    assert_eq!(refused["errors"][0]["pointer"], "/uncertainty/quantities/0/quantity");
+}
+
 async fn diagnosed(server: &Server, job: &Value) -> Value {
     let request = server.post_to("/v1/diagnosis", job.to_string()).header("prefer", "wait=60");
     request.send().await.unwrap().json().await.unwrap()

@@ -1,6 +1,7 @@
 //! What an extended model is worth, what speaks against it, and what the user may ask of a diagnosis.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+use crate::draw::Draw;
 use precut_calc::calculator::{
     Allowed, Answer, Calculator, Check, ConditionRange, Diagnosable, ForwardModel, Ranges, Rows, Unwatched, Violations,
 };
@@ -189,6 +190,66 @@ fn the_example_says_what_its_model_saves_on_the_next_shaft() {
     with_tolerance["job"]["tolerance"] = json!({ "form_um": f64::midpoint(form.base.mean, form.extended.mean) });
     let form = answered(&with_tolerance).output.downstream[0].clone();
     assert!(form.base.share_allowed.unwrap() < 0.1 && form.extended.share_allowed.unwrap() > 0.9, "{form:?}");
+}
+
+/// A standard normal number.
+fn normal(draw: &mut Draw) -> f64 {
+    let share = draw.share().clamp(1e-10, 1.0 - 1e-10);
+    -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * share)
+}
+
+/// How probably the next shaft is good, made with the base and with the model: against shafts that are really cut along both paths,
+/// with a headstock drawn from what the rows leave open and force and tool drawn as the base job says.
+#[test]
+fn the_next_shaft_is_good_as_often_as_said() {
+    const FORCE: f64 = 0.06;
+    const SETTING_UM: f64 = 1.5;
+    let mut request = headstock();
+    request["job"]["include"] = json!({ "mode": "as_stated" });
+    request["job"]["path"] = json!({ "chord_tolerance_um": 0.0, "increment_um": 0.001 });
+    request["job"]["uncertainty"] = json!({ "quantities": [
+        { "quantity": "force", "distribution": { "kind": "lognormal", "log_standard_deviation": FORCE } },
+        { "quantity": "tool_setting", "distribution": { "kind": "normal", "standard_uncertainty_um": SETTING_UM } }] });
+    assert!(answered(&request).output.good_parts.is_none(), "nothing is limited");
+    for (lower, upper, gain) in [(-12.0, 12.0, 0.25), (-20.0, 20.0, 0.0)] {
+        request["job"]["tolerance"] = json!({ "diameter_lower_um": lower, "diameter_upper_um": upper });
+        let output = answered(&request).output;
+        let good = output.good_parts.unwrap();
+        let (effects, open) = (serde_json::to_value(&output.effects).unwrap(), &output.effects_uncertainty);
+        assert_eq!(
+            (open.len(), open[0].moves.len(), effects[0]["kind"].as_str()),
+            (1, 1, Some("headstock_compliance"))
+        );
+        let mut base = request["job"].clone();
+        base["stations"] = json!({ "kind": "per_zone", "count": 41 });
+        let mut draw = Draw::new(43);
+        for (effects_believed, told) in [(json!([]), good.base), (effects.clone(), good.extended)] {
+            let mut planned = base.clone();
+            planned["effects"] = effects_believed;
+            let path = crate::support::solved(planned).stations;
+            let count = 300;
+            let shafts = (0..count).filter(|_| {
+                let [headstock, force, setting] = [(); 3].map(|()| normal(&mut draw));
+                let mut truth = crate::deflection_uncertainty::with_force(&base, (FORCE * force).exp());
+                truth.as_object_mut().unwrap().remove("tolerance");
+                truth.as_object_mut().unwrap().remove("uncertainty");
+                let delta = effects[0]["delta_um_per_n"].as_f64().unwrap() + open[0].moves[0].by * headstock;
+                truth["effects"] = json!([{ "kind": "headstock_compliance", "delta_um_per_n": delta }]);
+                let commands: Vec<Option<f64>> =
+                    path.commanded_diameter_mm.iter().map(|d| d.map(|d| d + SETTING_UM * setting / 1000.0)).collect();
+                let errors = crate::deflection_uncertainty::cut_with(&truth, &path.z_mm, &commands);
+                errors.iter().all(|error| (lower..=upper).contains(error))
+            });
+            let (found, p) = (shafts.count() as f64 / f64::from(count), told.probability);
+            let deviation = (p.max(0.02) * (1.0 - p).max(0.02) / f64::from(count)).sqrt();
+            eprintln!("{lower} to {upper}: told {p} +- {}, found {found}", told.numerical_error);
+            assert!(
+                (found - p).abs() < 2.5 * deviation + told.numerical_error,
+                "{lower} to {upper}: {found}, told {p}"
+            );
+        }
+        assert!(good.extended.probability > good.base.probability + gain, "{good:?}");
+    }
 }
 
 #[test]

@@ -105,6 +105,95 @@ fn a_risk_of_each_limit_is_the_plain_schedule_with_limits_moved_in() {
     near("a half", number(&solved(&half), "/objective"), number(&solved(&plain), "/objective"), 1e-6);
 }
 
+/// A zone with a risk of its own is the plain schedule whose limits there are moved in by that.
+#[test]
+fn a_zone_may_have_a_risk_of_its_own() {
+    let mut job = case("f1-each-one-percent")["job"].clone();
+    let edges = 2.053_748_910_631_823;
+    let mut moved = by_hand(&job, [2.326_347_874_040_841, edges]);
+    // The quantile of 0.1 %.
+    moved["zones"][1] = by_hand(&job, [3.090_232_306_167_813, edges])["zones"][1].clone();
+    let everywhere = number(&solved(&job), "/objective");
+    job["zones"][1]["risk_percent"] = json!(0.1);
+    let own = solved(&job);
+    near("objective", number(&own, "/objective"), number(&solved(&moved), "/objective"), 1e-7);
+    assert!(number(&own, "/objective") > everywhere * (1.0 + 1e-5));
+    let of = |answer: &Value, limit: &str| -> Value {
+        let all = answer["conformance"]["limits"].as_array().unwrap();
+        all.iter().find(|one| one["limit"] == limit).unwrap().clone()
+    };
+    // The worst place of a limit stays in another zone, and no warning is told of what was asked for.
+    assert!((number(&of(&own, "roughness"), "/probability") - 0.99).abs() < 1e-6);
+    assert_ne!(of(&own, "roughness")["zone"], "z2");
+    // What a percent of the common risk is worth, by difference, the zone's own as it is.
+    let gain = number(&own, "/conformance/gain_percent_per_percent_of_risk");
+    let at = |percent: f64| {
+        let mut job = job.clone();
+        job["risk"]["risk_percent"] = json!(percent);
+        number(&solved(&job), "/objective")
+    };
+    near("gain", gain, (at(0.99) / at(1.01)).ln() / (1.01_f64 / 0.99).ln(), 0.01);
+}
+
+/// A risk of a zone that cannot be had is told with the least that can, and that is tried.
+#[test]
+fn a_risk_of_a_zone_that_cannot_be_had_is_refused_with_the_least_that_can() {
+    let mut job = case("f4-infeasible-at-the-risk")["job"].clone();
+    job["risk"]["kind"] = json!("each");
+    job["risk"]["risk_percent"] = json!(45.0);
+    solved(&job);
+    job["zones"][0]["risk_percent"] = json!(0.001);
+    let least = match answered(&job) {
+        Err(Failure::OutOfModel(finding)) if finding.code == "infeasible_at_this_risk" => finding.limit.unwrap(),
+        other => panic!("{other:?}"),
+    };
+    job["zones"][0]["risk_percent"] = json!(least * 1.0001);
+    solved(&job);
+    job["zones"][0]["risk_percent"] = json!(least * 0.999);
+    assert!(answered(&job).is_err());
+}
+
+/// A worn-out edge costs what it costs as often as it is worn out: an edge costs as much more.
+#[test]
+fn a_worn_out_edge_is_paid_as_often_as_it_is_risked() {
+    for name in ["f1-each-one-percent", "f6-whole-edges-risk"] {
+        let mut job = case(name)["job"].clone();
+        let risk = number(&job, "/risk/edge_risk_percent") / 100.0;
+        let mut dearer = job.clone();
+        dearer["objective"]["edge_cost"] = json!(number(&job, "/objective/edge_cost") + risk * 80.0);
+        let before = number(&solved(&job), "/objective");
+        job["risk"]["edge_failure_cost"] = json!(80.0);
+        let [own, dearer] = [&job, &dearer].map(|job| number(&solved(job), "/objective"));
+        near(name, own, dearer, 1e-9);
+        assert!(own > before * (1.0 + 1e-4), "{own} {before}");
+    }
+}
+
+#[test]
+fn what_is_asked_of_single_risks_in_vain_is_told() {
+    let faults = |change: &dyn Fn(&mut Value)| -> Vec<String> {
+        let mut job = case("f1-each-one-percent")["job"].clone();
+        change(&mut job);
+        let job: Job = serde_json::from_value(job).unwrap();
+        let mut violations = Violations::default();
+        job.check(&mut violations);
+        violations.into_vec().iter().map(|one| format!("{} {}", one.code, one.pointer)).collect()
+    };
+    let of_zone = faults(&|job| {
+        job["risk"] = json!({ "kind": "joint", "risk_percent": 1 });
+        job["zones"][2]["risk_percent"] = json!(0.5);
+    });
+    assert_eq!(of_zone, ["zone_risk_without_each /zones/2/risk_percent"]);
+    let of_edges = faults(&|job| {
+        job["risk"] = json!({ "kind": "each", "risk_percent": 1, "edge_failure_cost": 80 });
+        job["objective"] = json!({ "kind": "time", "tool_change_time_min": 2 });
+    });
+    assert_eq!(
+        of_edges,
+        ["edge_failure_without_cost /objective/kind", "edge_failure_without_risk /risk/edge_failure_cost"]
+    );
+}
+
 /// A standard normal number.
 fn normal(draw: &mut Draw) -> f64 {
     let share = draw.share().clamp(1e-12, 1.0 - 1e-12);

@@ -8,6 +8,7 @@ use super::{
     Calculator, Consequence, Design, Example, Expansions, Failure, ForwardModel, Hypotheses, Hypothesis, MeasuredRow,
     Monitor, Prediction, Ranges, Rows, Treatment, Variable,
 };
+use crate::effects::JointUncertainty;
 
 /// A calculator whose model can be compared with measurements, cause by cause.
 pub trait Diagnosable:
@@ -112,6 +113,23 @@ pub trait Diagnosable:
         Ok(Vec::new())
     }
 
+    /// Draws by which [`Self::parts_kept`] is asked.
+    const PARTS_DRAWN: usize = 0;
+
+    /// Whether the next part keeps all limits of the job when it is made with the effects `believed`, for each of `acting` together
+    /// with a draw of what else the job says is uncertain; of that what is `told` of an effect takes the place. `None` where nothing
+    /// of a part is limited, and where none can be made so.
+    fn parts_kept(
+        _job: &Self::Job,
+        _runs: &[Self::Run],
+        _believed: &[Self::Effect],
+        _acting: &[Vec<Self::Effect>],
+        _told: &ToldEffects<'_, Self::Effect>,
+        _monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<bool>>, Failure> {
+        Ok(None)
+    }
+
     /// Effects that act though nobody found them: one draw of what the job allows the model to be wrong by in the next cut,
     /// `normal` giving standard normal numbers.
     fn allowed(_allowances: &Self::Allowances, _normal: &mut dyn FnMut() -> f64) -> Vec<Self::Effect> {
@@ -153,6 +171,15 @@ pub trait Diagnosable:
     fn predict_ms(_job: &Self::Job) -> f64 {
         0.0
     }
+}
+
+/// Effects that a diagnosis tells, and what it leaves open of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToldEffects<'a, E> {
+    /// The effects.
+    pub effects: &'a [E],
+    /// What is not known of them.
+    pub open: &'a [JointUncertainty],
 }
 
 /// Something without a name that goes with a place along a part, or with one or two conditions.

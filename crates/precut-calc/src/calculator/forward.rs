@@ -1,7 +1,7 @@
 //! What a diagnosis needs of a calculator: the model as a function of its effects.
 
 use super::{Cost, Failure, Finding, Monitor, Unwatched};
-use crate::effects::{Cause, Parameter};
+use crate::effects::{Cause, JointUncertainty, Parameter};
 use serde::{Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
 
@@ -23,6 +23,8 @@ pub trait ForwardModel {
 
     /// The catalogue's entries for this model.
     const CAUSES: &'static [Cause];
+    /// Whether `uncertainty.effects` of its job says what is not known of the effects that it holds.
+    const TAKES_OPEN_EFFECTS: bool = false;
     /// What it predicts.
     const QUANTITIES: &'static [Quantity];
     /// Conditions of a run that may be set to any value of a range.
@@ -41,6 +43,11 @@ pub trait ForwardModel {
 
     /// The effects that a job holds.
     fn own_effects(job: &Self::Job) -> &[Self::Effect];
+
+    /// What the job says is not known of them, where it takes that.
+    fn open_effects(_job: &Self::Job) -> &[JointUncertainty] {
+        &[]
+    }
 
     /// A job without them.
     fn without_effects(job: &Self::Job) -> Self::Job;

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Finding, Message};
 
 use super::lines::Estimate;
-use super::{Level, Source, bounded};
+use super::{Level, Source, bounded, open};
 
 /// How probable it is that a part is good, what makes that uncertain and what would help.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -118,7 +118,7 @@ pub struct SeveralParts {
 /// What a quantity adds to the doubt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Contribution {
-    /// Its name.
+    /// Its name; `model:`, the effect and its parameter, where it is what a diagnosis leaves open of that.
     #[schema(example = "force")]
     pub quantity: String,
     /// Where its distribution is from.
@@ -169,9 +169,18 @@ pub(crate) fn probably(
     if let Some(least) = limits.iter().min_by(|a, b| a.probability.total_cmp(&b.probability)) {
         said = said.with("limit", least.limit.clone()).with("limit_percent", 100.0 * least.probability);
     }
-    match contributions.first().and_then(|largest| Some((largest, largest.share_of_variance?))) {
-        Some((largest, share)) => said.with("quantity", largest.quantity.clone()).with("share_percent", 100.0 * share),
-        None => said,
+    with_largest(said, contributions)
+}
+
+/// A sentence that names what makes most of the doubt: a quantity, or an effect of which something is not known. Where quantities go
+/// together none has a share of its own.
+pub(crate) fn with_largest(said: Message, contributions: &[Contribution]) -> Message {
+    let largest = contributions.iter().find_map(|one| Some((one, one.share_of_variance?)));
+    let Some((largest, share)) = largest else { return said };
+    let said = said.with("share_percent", 100.0 * share);
+    match open::effect_of(&largest.quantity) {
+        Some(kind) => said.with("effect", kind.to_owned()),
+        None => said.with("quantity", largest.quantity.clone()),
     }
 }
 

@@ -35,8 +35,8 @@ pub(crate) struct Asked<'a, Q, const K: usize, const S: usize> {
 pub(crate) struct Around<'a, Q, const K: usize, const S: usize> {
     asked: Asked<'a, Q, K, S>,
     surface: Surface,
-    /// Standard deviation of the logarithm of every quantity.
-    scales: Vec<f64>,
+    /// Of every factor its median and the standard deviation of its logarithm.
+    scales: Vec<(f64, f64)>,
     /// Change of every limit with every independent score.
     slopes: Vec<Vec<f64>>,
     /// How far away the limits are by them, in standard deviations.
@@ -49,11 +49,12 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
     /// At least one quantity is uncertain.
     pub(crate) fn of(asked: Asked<'a, Q, K, S>) -> Result<Self, Failure> {
         let scale = |one: &Uncertain<Q>| 0.5 * (one.distribution.at(1.0) / one.distribution.at(-1.0)).ln();
-        let scales: Vec<f64> = asked.uncertainties.of.iter().map(scale).collect();
-        let medians: Vec<f64> = asked.uncertainties.of.iter().map(|one| one.distribution.at(0.0)).collect();
-        let surface = Surface::of(&vec![true; scales.len()], &mut |x| {
-            let factor = |i: usize| medians[i] * (scales[i] * x[i]).exp();
-            let margins = asked.tried(&(0..x.len()).map(factor).collect::<Vec<_>>())?;
+        let scales: Vec<(f64, f64)> =
+            asked.uncertainties.of.iter().map(|one| (one.distribution.at(0.0), scale(one))).collect();
+        let surface = Surface::of(&vec![true; asked.uncertainties.count()], &mut |x| {
+            // What is not known of effects comes in standard deviations.
+            let value = |i: usize| scales.get(i).map_or(x[i], |(median, scale)| median * (scale * x[i]).exp());
+            let margins = asked.tried(&(0..x.len()).map(value).collect::<Vec<_>>())?;
             Ok(asked.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())
         })?;
         let mut around = Self { asked, surface, scales, slopes: Vec::new(), distances: Vec::new(), axis: Vec::new() };
@@ -63,14 +64,10 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
 
     /// Margins by the response surface; infinite where there is no limit.
     fn near(&self, of: &Uncertainties<Q>, independent: &[f64], is_bent: bool) -> Margins<K> {
-        let medians = self.asked.uncertainties.of.iter().map(|one| one.distribution.at(0.0));
-        let values = of.values(independent);
-        let x: Vec<f64> = values
-            .iter()
-            .zip(medians)
-            .zip(&self.scales)
-            .map(|((value, median), scale)| (value / median).ln() / scale)
-            .collect();
+        let x = |(i, value): (usize, f64)| {
+            self.scales.get(i).map_or(value, |(median, scale)| (value / median).ln() / scale)
+        };
+        let x: Vec<f64> = of.values(independent).into_iter().enumerate().map(x).collect();
         let found = if is_bent { self.surface.at(&x) } else { self.surface.linear_at(&x) };
         let mut margins = [f64::INFINITY; K];
         self.asked.limits.iter().zip(found).for_each(|(&limit, margin)| margins[limit] = margin);
@@ -79,7 +76,7 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
 
     /// Sets how the limits change with independent scores, and how far away they are by that.
     fn set_slopes(&mut self) {
-        let count = self.scales.len();
+        let count = self.asked.uncertainties.dimensions();
         let uncertainties = self.asked.uncertainties;
         let change = |index: usize, limit: usize| {
             let at = |score: f64| {
@@ -155,14 +152,10 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
         let now = lines.map(|lines| self.on_few(of, lines)).transpose()?;
         let mut all: Vec<Contribution> = Vec::new();
-        for one in &of.of {
-            let name = one.quantity.name();
-            if all.iter().any(|told| told.quantity == name) {
-                continue;
-            }
-            let own: Vec<usize> = (0..of.of.len()).filter(|&index| of.of[index].quantity.name() == name).collect();
-            let of_own: f64 = own.iter().map(|&index| slopes[index] * slopes[index]).sum();
-            let share = if variance > 0.0 { of_own / variance } else { 0.0 };
+        for (one, own) in of.named() {
+            // Each has the score of its own place, where they are independent.
+            let of_own = || own.iter().map(|&index| slopes[index] * slopes[index]).sum::<f64>();
+            let share = || if variance > 0.0 { of_own() / variance } else { 0.0 };
             let halved = match lines.zip(now) {
                 Some((lines, now)) => {
                     let halved = own.iter().fold(of.clone(), |of, &index| of.halved(index));
@@ -171,10 +164,10 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
                 None => None,
             };
             all.push(Contribution {
-                quantity: name.to_owned(),
+                quantity: one.name.to_owned(),
                 source: one.source,
                 level: one.level,
-                share_of_variance: of.scores.is_independent().then_some(share),
+                share_of_variance: of.is_independent().then(share),
                 joint_probability_if_halved: halved,
             });
         }

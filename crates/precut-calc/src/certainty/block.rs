@@ -55,6 +55,7 @@ macro_rules! uncertainty_block {
         $block:ident {
             quantities: $one:ident of $quantity:ident ($($quantities:tt)*), such as $example:tt;
             correlations: $pair:ident ($pairs:tt), such as $examples:tt;
+            $(effects: $open:ty;)?
             $(#[$defaults:meta])*
             defaults;
             $(#[$wanted:meta])*
@@ -73,6 +74,13 @@ macro_rules! uncertainty_block {
             #[serde(default, skip_serializing_if = "Vec::is_empty")]
             #[schema(max_items = $pairs, extensions(("x-advanced" = json!(true))))]
             pub correlations: Vec<$pair>,
+            $(
+                /// What is not known of the effects of the job, as a diagnosis leaves it; a stored model brings its own. It takes the
+                /// place of what is usual of the same.
+                #[serde(default, skip_serializing_if = "Vec::is_empty")]
+                #[schema(max_items = 256, extensions(("x-advanced" = json!(true))))]
+                pub effects: $open,
+            )?
             $(#[$defaults])*
             #[serde(default = "crate::certainty::block::yes")]
             #[schema(default = true, example = true)]
@@ -93,6 +101,7 @@ macro_rules! uncertainty_block {
                 Self {
                     quantities: Vec::new(),
                     correlations: Vec::new(),
+                    $(effects: <$open>::new(),)?
                     defaults: yes(),
                     wanted_probability: nineteen_of_twenty(),
                     seed: one(),

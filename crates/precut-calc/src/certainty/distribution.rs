@@ -104,6 +104,8 @@ pub enum Source {
     Stated,
     /// What the job has measured tells it.
     Measured,
+    /// What a diagnosis leaves open of an effect of the job.
+    Model,
 }
 
 /// In what the width of a quantity is given.

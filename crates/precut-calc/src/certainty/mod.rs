@@ -11,6 +11,7 @@ pub(crate) mod deepest;
 mod distribution;
 mod line;
 pub(crate) mod lines;
+pub(crate) mod open;
 pub(crate) mod picture;
 mod quantities;
 mod scores;
@@ -19,13 +20,14 @@ mod surface;
 pub use answer::{
     Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts,
 };
-pub(crate) use answer::{improbable, probably};
+pub(crate) use answer::{improbable, probably, with_largest};
 pub(crate) use block::{Block, uncertainty_block};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};
+pub(crate) use open::OpenEffects;
 pub(crate) use quantities::{
-    CODES as QUANTITY_CODES, MISSING_CODES, Pair, Quantity, Uncertain, Uncertainties, check_correlations,
-    check_presence, check_quantities,
+    CODES as QUANTITY_CODES, MISSING_CODES, Pair, Quantity, Uncertain, Uncertainties, check_brought,
+    check_correlations, check_presence, check_quantities,
 };
 pub(crate) use scores::{Contradiction, Scores};
 pub(crate) use surface::Surface;

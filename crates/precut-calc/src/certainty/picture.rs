@@ -12,11 +12,15 @@ pub(crate) const ID: &str = "doubt";
 pub(crate) const LABEL_CODES: &[&str] =
     &["doubt", "doubt_rank", "doubt_share", "doubt_probability", "doubt_now", "doubt_wanted"];
 
+/// Code of all that is not known of effects.
+pub(crate) const MODEL_LABEL: &str = "doubt_model";
+
 /// The picture; `labels` are those of the calculator's quantities, `doubt_` before their names. `None` where
 /// nothing is doubted, and where nobody asked what half of a width makes of it.
 pub(crate) fn figure(all: &[Contribution], joint: &JointlyKept, labels: &[&'static str]) -> Option<Figure> {
     let label = |one: &Contribution| {
-        let is_own = |label: &&&str| label.strip_prefix("doubt_") == Some(one.quantity.as_str());
+        let code = one.quantity.split(':').next().unwrap_or_default();
+        let is_own = |label: &&&str| label.strip_prefix("doubt_") == Some(code);
         labels.iter().find(is_own).copied().unwrap_or("doubt")
     };
     let bars = |of: fn(&Contribution) -> Option<f64>| -> Vec<Item> {

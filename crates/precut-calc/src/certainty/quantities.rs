@@ -2,7 +2,7 @@
 
 use crate::calculator::{Finding, Violations};
 
-use super::{Contradiction, Distribution, Level, Scores, Source, WidthUnit};
+use super::{Contradiction, Distribution, Level, OpenEffects, Scores, Source, WidthUnit};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &["duplicate_quantity", "bad_correlation", "correlations_contradict"];
@@ -27,11 +27,20 @@ pub(crate) struct Uncertain<Q> {
 /// How two quantities go together: which, and the correlation of their scores.
 pub(crate) type Pair<'a, Q> = (&'a [Q], f64);
 
-/// All quantities of a job that are uncertain, and how they go together.
+/// All quantities of a job that are uncertain, and how they go together: its own, then the modes of what is not known of its effects.
 #[derive(Debug, Clone)]
 pub(crate) struct Uncertainties<Q> {
     pub of: Vec<Uncertain<Q>>,
     pub scores: Scores,
+    pub effects: OpenEffects,
+}
+
+/// What is told of a quantity, or of a mode of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Told<'a> {
+    pub name: &'a str,
+    pub source: Source,
+    pub level: Level,
 }
 
 impl<Q: Quantity> Uncertainties<Q> {
@@ -52,12 +61,64 @@ impl<Q: Quantity> Uncertainties<Q> {
             })
             .collect();
         let scores = Scores::new(of.len(), &pairs)?;
-        Ok(Self { of, scores })
+        Ok(Self { of, scores, effects: OpenEffects::default() })
+    }
+
+    /// The same with what is not known of effects.
+    pub(crate) fn beside(self, effects: OpenEffects) -> Self {
+        Self { effects, ..self }
+    }
+
+    /// Quantities, each mode of what is not known of effects counted.
+    pub(crate) fn count(&self) -> usize {
+        self.of.len() + self.effects.count()
+    }
+
+    /// Independent scores behind them.
+    pub(crate) fn dimensions(&self) -> usize {
+        self.of.len() + self.effects.dimensions()
+    }
+
+    /// Whether no quantity tells of another; then each has the score of its own place.
+    pub(crate) fn is_independent(&self) -> bool {
+        self.scores.is_independent() && self.effects.is_independent()
+    }
+
+    /// Among what an independent score varies.
+    pub(crate) fn level(&self, score: usize) -> Level {
+        self.of.get(score).map_or(Level::Setup, |one| one.level)
+    }
+
+    /// What is told of the quantity in a place.
+    pub(crate) fn told(&self, place: usize) -> Told<'_> {
+        match self.of.get(place) {
+            Some(one) => Told { name: one.quantity.name(), source: one.source, level: one.level },
+            None => Told { name: self.effects.name(place - self.of.len()), source: Source::Model, level: Level::Setup },
+        }
+    }
+
+    /// The names of all quantities, each with its places.
+    pub(crate) fn named(&self) -> Vec<(Told<'_>, Vec<usize>)> {
+        let mut named: Vec<(Told<'_>, Vec<usize>)> = Vec::new();
+        for (place, told) in (0..self.count()).map(|place| (place, self.told(place))) {
+            match named.iter_mut().find(|(own, _)| own.name == told.name) {
+                Some((_, places)) => places.push(place),
+                None => named.push((told, vec![place])),
+            }
+        }
+        named
     }
 
     /// What every quantity comes to at independent scores: factors, and additions in their unit.
     pub(crate) fn values(&self, independent: &[f64]) -> Vec<f64> {
-        self.of.iter().zip(self.scores.of(independent)).map(|(one, score)| one.distribution.at(score)).collect()
+        let (own, of_effects) = independent.split_at(self.of.len());
+        let own = self.of.iter().zip(self.scores.of(own)).map(|(one, score)| one.distribution.at(score));
+        own.chain(self.effects.values(of_effects)).collect()
+    }
+
+    /// Of all values those of what is not known of effects.
+    pub(crate) fn of_effects<'v>(&self, values: &'v [f64]) -> &'v [f64] {
+        values.get(self.of.len()..).unwrap_or_default()
     }
 
     /// Of every quantity what it comes to at its median, and half of what lies between scores of -1 and 1.
@@ -66,13 +127,16 @@ impl<Q: Quantity> Uncertainties<Q> {
             let at = |score: f64| one.distribution.at(score);
             (at(0.0), 0.5 * (at(1.0) - at(-1.0)))
         };
-        self.of.iter().map(of).collect()
+        self.of.iter().map(of).chain(std::iter::repeat_n((0.0, 1.0), self.effects.count())).collect()
     }
 
     /// The same with half of the width of one of them.
     pub(crate) fn halved(&self, index: usize) -> Self {
         let mut halved = self.clone();
-        halved.of[index].distribution = halved.of[index].distribution.halved();
+        match halved.of.get_mut(index) {
+            Some(own) => own.distribution = own.distribution.halved(),
+            None => halved.effects.halve(index - self.of.len()),
+        }
         halved
     }
 }
@@ -84,6 +148,21 @@ pub(crate) fn check_quantities<Q: Quantity>(stated: &[(Q, &Distribution)], viola
         distribution.check(quantity.unit(), &at("/distribution"), violations);
         violations.require(stated[..i].iter().all(|before| before.0 != *quantity), || {
             Finding::new("duplicate_quantity", at("/quantity")).with("quantity", quantity.name())
+        });
+    }
+}
+
+/// Finds quantities that are stated although what is not known of the effects brings them.
+pub(crate) fn check_brought<Q: Quantity>(
+    stated: impl IntoIterator<Item = Q>,
+    is_brought: impl Fn(Q) -> bool,
+    violations: &mut Violations,
+) {
+    for (i, quantity) in stated.into_iter().enumerate() {
+        violations.require(!is_brought(quantity), || {
+            Finding::new("duplicate_quantity", format!("/uncertainty/quantities/{i}/quantity"))
+                .with("quantity", quantity.name())
+                .with("brought_by", "model")
         });
     }
 }

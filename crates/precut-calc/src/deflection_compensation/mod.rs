@@ -73,7 +73,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -220,7 +220,7 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
         .outcome(driven, passes, &errors, monitor)?;
     outcome.included_automatically = included_automatically;
     (outcome.aim_shift_um, outcome.conformance, outcome.error_fan) = (sure.aim_um, sure.conformance, sure.fan);
-    let uncertainty_um = uncertainty_um(job, &acting, &stage);
+    let uncertainty_um = uncertainty_um(job, &grid, &acting, &stage)?;
     let drawn = drawn.flatten();
     let warnings = answer::advice::warnings(job, &grid, &acting, &stage, &outcome, drawn.as_ref(), &uncertainty_um);
     let warnings = answer::advice::with_earlier(warnings, of_passes);
@@ -257,19 +257,8 @@ fn aimed<'a>(
     look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
 ) -> Result<(Driven<'a>, Sure), Failure> {
-    let mut driven = drive(job, grid, acting, 0.0, look, monitor)?;
-    let mut sure = Sure::default();
-    if job.aim != (Aim::Nominal {}) {
-        let judged = match &driven.rehearsal {
-            Some(rehearsal) => Judged::of(job.asked(), rehearsal, monitor)?,
-            None => None,
-        };
-        sure.aim_um = match judged {
-            Some(judged) => judged.aim_um(&job.aim)?,
-            None => job.tolerance.size().middle_um().unwrap_or(0.0),
-        };
-        driven = drive(job, grid, acting, sure.aim_um, &mut |_, _, _| (), monitor)?;
-    }
+    let (driven, aim_um) = cuts_at_aim(job, grid, acting, look, monitor)?;
+    let mut sure = Sure { aim_um, ..Sure::default() };
     if let Some(rehearsal) = &driven.rehearsal {
         // The path of the rehearsal is aimed already.
         if let Some(judged) = Judged::of(job.asked(), rehearsal, monitor)? {
@@ -278,6 +267,29 @@ fn aimed<'a>(
         }
     }
     Ok((driven, sure))
+}
+
+/// The cuts of a job, the last one aimed as the job says, and by how much that shifts its command, um.
+fn cuts_at_aim<'a>(
+    job: &'a Job,
+    grid: &Grid,
+    acting: &'a Acting,
+    look: &mut dyn FnMut(&Grid, &Stage, usize),
+    monitor: &dyn Monitor,
+) -> Result<(Driven<'a>, f64), Failure> {
+    let driven = drive(job, grid, acting, 0.0, look, monitor)?;
+    if job.aim == (Aim::Nominal {}) {
+        return Ok((driven, 0.0));
+    }
+    let judged = match &driven.rehearsal {
+        Some(rehearsal) => Judged::of(job.asked(), rehearsal, monitor)?,
+        None => None,
+    };
+    let aim_um = match judged {
+        Some(judged) => judged.aim_um(&job.aim)?,
+        None => job.tolerance.size().middle_um().unwrap_or(0.0),
+    };
+    Ok((drive(job, grid, acting, aim_um, &mut |_, _, _| (), monitor)?, aim_um))
 }
 
 /// What an outcome is put together from.
@@ -368,6 +380,7 @@ const CODES: Codes = Codes {
         diameters::CODES,
         certainty::DISTRIBUTION_CODES,
         certainty::QUANTITY_CODES,
+        certainty::open::CODES,
         crate::shaft::check::CODES,
         force::FAULT_CODES,
     ],

@@ -12,9 +12,10 @@ use crate::calculator::{
     Violations,
 };
 use crate::diagnosis::answer::output::DiagnosisResult;
-use crate::diagnosis::model::known::{Known, has_parameter};
+use crate::diagnosis::model::known::Known;
 use crate::diagnosis::rows::copies::{copies, digits_written};
 use crate::diagnosis::rows::data::{Data, Layout};
+use crate::effects::{JointUncertainty, has_parameter};
 
 /// Rows from which on at least adequacy can be judged.
 pub(super) const LEAST_ROWS: usize = 8;
@@ -46,7 +47,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 21,
+        version: 22,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -113,7 +114,7 @@ fn statistics(rows: usize, runs: usize, weighings: usize) -> (f64, u64) {
 
 /// The base of a diagnosis: a job without effects, and those that it had.
 pub(super) fn base_of<M: Diagnosable>(job: &JobOf<M>) -> (M::Job, Known<M::Effect>) {
-    let known = Known { effects: M::own_effects(&job.job).to_vec(), unsure: job.effects_uncertainty.clone() };
+    let known = Known { effects: M::own_effects(&job.job).to_vec(), unsure: unsure::<M>(job) };
     (M::without_effects(&job.job), known)
 }
 
@@ -354,6 +355,11 @@ where
                 .with("name", range.condition.clone())
         });
     }
+}
+
+/// What is not known of the effects of the base: as the diagnosis says, and as the base job does.
+fn unsure<M: Diagnosable>(job: &JobOf<M>) -> Vec<JointUncertainty> {
+    job.effects_uncertainty.iter().chain(M::open_effects(&job.job)).cloned().collect()
 }
 
 /// Refuses an uncertainty of an effect, or of a parameter, that the base does not have.

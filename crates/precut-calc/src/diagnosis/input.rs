@@ -6,8 +6,8 @@ use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{ConditionRange, ForwardModel, Measured, MeasuredRow, Measurement};
-use crate::diagnosis::model::known::JointUncertainty;
 use crate::diagnosis::verdict::weigh::LEVEL;
+use crate::effects::JointUncertainty;
 
 /// Most runs of one diagnosis.
 pub const MAX_RUNS: usize = 500;

@@ -1,10 +1,11 @@
 //! How what a part is cut with differs from what its job states.
 
+use crate::effects::DeflectionEffect;
 use crate::shaft::elastic::ends;
 use crate::shaft::{Carriage, Support};
 
 /// How what is cut with differs from what the job states.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Draw {
     /// Factor on all cutting forces.
     pub(crate) force: f64,
@@ -25,6 +26,8 @@ pub(crate) struct Draw {
     pub(crate) stock_mm: f64,
     /// Added to the radius that is left, mm.
     pub(crate) scatter_mm: f64,
+    /// Effects in place of those of the job.
+    pub(crate) effects: Option<Vec<DeflectionEffect>>,
 }
 
 impl Draw {
@@ -41,13 +44,14 @@ impl Draw {
         tool_setting_mm: 0.0,
         stock_mm: 0.0,
         scatter_mm: 0.0,
+        effects: None,
     };
 
     /// Whether it differs by more than loads that are all multiplied by one number.
     #[allow(clippy::float_cmp)] // what is stated is stated exactly
     pub(crate) fn changes_structure(&self) -> bool {
-        let Self { youngs_modulus, headstock, tailstock, rests, carriage, rest_gap_mm, .. } = *self;
-        [youngs_modulus, headstock, tailstock, rests, carriage] != [1.0; 5] || rest_gap_mm != 0.0
+        let Self { youngs_modulus, headstock, tailstock, rests, carriage, rest_gap_mm, ref effects, .. } = *self;
+        [youngs_modulus, headstock, tailstock, rests, carriage] != [1.0; 5] || rest_gap_mm != 0.0 || effects.is_some()
     }
 
     /// Puts factors on what holds the shaft and what carries the tool.

@@ -12,7 +12,7 @@ impl Judged<'_> {
     pub(super) fn first_part(&self, shift_um: f64, now: Estimate) -> Result<Option<Improvement>, Failure> {
         let gauge = self.gauge_um();
         let (errors_um, slopes_um) = (self.stated_um(), &self.slopes.of_um);
-        let is_common = |index: usize| self.uncertainties.of[index].level == Level::Setup;
+        let is_common = |index: usize| self.uncertainties.level(index) == Level::Setup;
         // What costs much to try is not advised. Scores of one level that are correlated with the other have no conditional distribution of that form.
         let is_tried = self.uncertainties.scores.is_independent() && !self.parts.cost_much();
         let Some(middle) = self.limits.middle_um().filter(|_| is_tried) else { return Ok(None) };

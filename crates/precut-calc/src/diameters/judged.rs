@@ -3,8 +3,8 @@
 use crate::calculator::{Failure, Monitor};
 use crate::certainty::lines::{Effort, Found, Margins, Question, Together, Values};
 use crate::certainty::{
-    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, Quantity, SeveralParts,
-    Surface, Uncertainties, bounded, normal_below,
+    Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts, Surface,
+    Uncertainties, bounded, normal_below,
 };
 
 use super::limits::SizeLimits;
@@ -59,6 +59,7 @@ struct Near {
 
 impl Near {
     fn of(
+        asked: &Asked<'_>,
         parts: &dyn Parts,
         uncertainties: &Uncertainties<DeflectionQuantity>,
         shift_step_um: f64,
@@ -70,7 +71,7 @@ impl Near {
         let surface = Surface::of(&acts, &mut |x| {
             let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
             let values: Vec<f64> = (0..count).map(at).collect();
-            parts.errors_um(&draw_of(uncertainties, &values), at(count))
+            parts.errors_um(&draw_of(uncertainties, asked.effects, &values)?, at(count))
         })?;
         Ok(Self { surface, scales })
     }
@@ -99,12 +100,12 @@ impl<'a> Judged<'a> {
     ) -> Result<Option<Self>, Failure> {
         let uncertainties = uncertainties(&asked)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
-        if uncertainties.of.is_empty() || parts.places().z_mm.is_empty() {
+        if uncertainties.count() == 0 || parts.places().z_mm.is_empty() {
             return Ok(None);
         }
         let limits = asked.tolerance.size();
         let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
-        let near = Near::of(parts, &uncertainties, step_um)?;
+        let near = Near::of(&asked, parts, &uncertainties, step_um)?;
         let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
         let mut judged = Self { asked, parts, uncertainties, limits, near, axis: Vec::new(), slopes, monitor };
         judged.slopes.of_um = judged.slopes_um()?;
@@ -114,7 +115,7 @@ impl<'a> Judged<'a> {
 
     /// Change of the errors with every independent score, by station.
     fn slopes_um(&self) -> Result<Vec<Vec<f64>>, Failure> {
-        let count = self.uncertainties.of.len();
+        let count = self.uncertainties.dimensions();
         let mut slopes_um = vec![vec![0.0; count]; self.parts.places().z_mm.len()];
         for index in 0..count {
             let at = |score: f64| {
@@ -161,7 +162,7 @@ impl<'a> Judged<'a> {
     ) -> Result<Vec<f64>, Failure> {
         let values = of.values(independent);
         match by {
-            By::Model => self.parts.errors_um(&draw_of(of, &values), shift_um),
+            By::Model => self.parts.errors_um(&draw_of(of, self.asked.effects, &values)?, shift_um),
             By::Surface => Ok(self.near.surface.at(&self.near.coordinates(&values, shift_um))),
         }
     }
@@ -304,16 +305,17 @@ impl<'a> Judged<'a> {
         advice.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
         let slopes = &self.slopes.of_um[self.slopes.deciding];
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
-        let is_independent = self.uncertainties.scores.is_independent();
+        let is_independent = self.uncertainties.is_independent();
         let share = |index: usize| if variance > 0.0 { slopes[index] * slopes[index] / variance } else { 0.0 };
         let mut contributions = Vec::new();
-        for (index, one) in self.uncertainties.of.iter().enumerate() {
+        for (one, places) in self.uncertainties.named() {
+            let halved = places.iter().fold(self.uncertainties.clone(), |of, &place| of.halved(place));
             contributions.push(Contribution {
-                quantity: one.quantity.name().to_owned(),
+                quantity: one.name.to_owned(),
                 source: one.source,
                 level: one.level,
-                share_of_variance: is_independent.then(|| share(index)),
-                joint_probability_if_halved: Some(told(&self.uncertainties.halved(index))?),
+                share_of_variance: is_independent.then(|| places.iter().map(|&place| share(place)).sum()),
+                joint_probability_if_halved: Some(told(&halved)?),
             });
         }
         Contribution::sort(&mut contributions);
@@ -378,7 +380,8 @@ impl<'a> Judged<'a> {
         let slopes = &self.slopes.of_um[self.slopes.deciding];
         let of = |level: Option<Level>| {
             let is_of = |one: Level| level.is_none_or(|level| level == one);
-            slopes.iter().zip(&self.uncertainties.of).filter(|(_, one)| is_of(one.level)).map(|(s, _)| s * s).sum()
+            let scores = slopes.iter().enumerate().filter(|(score, _)| is_of(self.uncertainties.level(*score)));
+            scores.map(|(_, s)| s * s).sum()
         };
         let all: f64 = of(None);
         if all > 0.0 { of(Some(Level::Setup)) / all } else { 1.0 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::quantities::{DeflectionCorrelation, DeflectionUncertainQuantity};
+use crate::effects::JointUncertainty;
 
 /// What the drawing allows, on the diameter.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -66,6 +67,14 @@ impl Tolerance {
         }
     }
 
+    /// Whether the largest and the smallest error, um, are within all of it.
+    pub(crate) fn holds(&self, [largest, smallest]: [f64; 2]) -> bool {
+        let size = self.size();
+        size.upper_um.is_none_or(|upper| largest <= upper)
+            && size.lower_um.is_none_or(|lower| smallest >= lower)
+            && self.form_um.is_none_or(|form| largest - smallest <= form)
+    }
+
     /// Whether nothing is limited.
     pub(crate) fn is_none(&self) -> bool {
         self.form_um.is_none() && self.size_pointer().is_none()
@@ -119,6 +128,11 @@ pub struct Uncertainty {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(max_items = 55, extensions(("x-advanced" = json!(true))))]
     pub correlations: Vec<DeflectionCorrelation>,
+    /// What is not known of the effects of the job, as a diagnosis leaves it; a stored model brings its own. It takes the
+    /// place of what is usual of the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(max_items = 256, extensions(("x-advanced" = json!(true))))]
+    pub effects: Vec<JointUncertainty>,
     /// Whether what is usual is uncertain, too, where nothing is said of it: force, stiffness and the tool's setting.
     #[serde(default = "yes")]
     #[schema(default = true, example = true)]
@@ -176,6 +190,7 @@ impl Default for Uncertainty {
             stiffness_percent: ten_percent(),
             quantities: Vec::new(),
             correlations: Vec::new(),
+            effects: Vec::new(),
             measurement: None,
             defaults: yes(),
             wanted_probability: nineteen_of_twenty(),

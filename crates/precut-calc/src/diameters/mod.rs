@@ -9,6 +9,7 @@ mod aim;
 mod draw;
 mod first_part;
 mod judged;
+mod kept;
 mod limits;
 mod places;
 mod quantities;
@@ -16,6 +17,7 @@ mod said;
 
 pub(crate) use draw::Draw;
 pub(crate) use judged::Judged;
+pub(crate) use kept::kept;
 pub use limits::{Aim, GaugeUncertainty, Tolerance, Uncertainty};
 pub(crate) use places::Places;
 pub(crate) use quantities::{CODES, DOUBT_LABELS, check};

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::calculator::{Finding, Violations};
+use crate::calculator::{Failure, Finding, Violations};
 use crate::certainty::{
-    Contradiction, Distribution, Level, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
-    check_correlations, check_quantities,
+    self, Contradiction, Distribution, Level, OpenEffects, Pair, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
+    check_brought, check_correlations, check_quantities,
 };
 use crate::effects::DeflectionEffect;
 
@@ -35,6 +35,7 @@ pub(crate) const DOUBT_LABELS: &[&str] = &[
     "doubt_tool_setting",
     "doubt_stock_diameter",
     "doubt_spindle_scatter",
+    certainty::picture::MODEL_LABEL,
 ];
 
 /// A quantity that is not known exactly.
@@ -90,6 +91,15 @@ impl Quantity for DeflectionQuantity {
     }
 }
 
+/// What `stiffness` stands for.
+const PARTS_OF_STIFFNESS: [DeflectionQuantity; 5] = [
+    DeflectionQuantity::YoungsModulus,
+    DeflectionQuantity::HeadstockCompliance,
+    DeflectionQuantity::TailstockCompliance,
+    DeflectionQuantity::RestCompliance,
+    DeflectionQuantity::CarriageCompliance,
+];
+
 impl DeflectionQuantity {
     fn usual_level(self) -> Level {
         match self {
@@ -100,14 +110,25 @@ impl DeflectionQuantity {
 
     /// Whether it is a part of what `stiffness` stands for.
     fn is_of_stiffness(self) -> bool {
-        matches!(
-            self,
-            Self::YoungsModulus
-                | Self::HeadstockCompliance
-                | Self::TailstockCompliance
-                | Self::RestCompliance
-                | Self::CarriageCompliance
-        )
+        PARTS_OF_STIFFNESS.contains(&self)
+    }
+
+    /// The effect that is the same quantity, as a diagnosis finds it; `None` where there is none.
+    fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::Force => Some("force_level"),
+            Self::YoungsModulus => Some("bending_scale"),
+            Self::HeadstockCompliance => Some("headstock_compliance"),
+            Self::TailstockCompliance => Some("tailstock_compliance"),
+            Self::CarriageCompliance => Some("carriage_compliance"),
+            Self::ToolSetting => Some("size_offset"),
+            Self::Stiffness | Self::RestCompliance | Self::RestGap | Self::StockDiameter | Self::SpindleScatter => None,
+        }
+    }
+
+    /// Whether what is not known of the effects of a job tells of it.
+    fn is_brought(self, asked: &Asked<'_>) -> bool {
+        self.effect().is_some_and(|kind| certainty::open::tells_of(asked.effects, &asked.uncertainty.effects, kind))
     }
 
     /// Puts its value, a factor or an addition in um, into a draw.
@@ -173,34 +194,56 @@ pub(super) fn uncertainties(asked: &Asked<'_>) -> Result<Uncertainties<Deflectio
             one.quantity == usual.quantity
                 || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
         });
-        if !is_stated && (stated.defaults || usual.source == Source::Stated) {
+        if !is_stated && !is_replaced(asked, usual.quantity) && (stated.defaults || usual.source == Source::Stated) {
             of.push(usual);
         }
     }
-    Uncertainties::new(of, pairs(stated))
+    Ok(Uncertainties::new(of, pairs(stated))?.beside(OpenEffects::of(asked.effects, &stated.effects)))
+}
+
+/// Whether what is usual of a quantity gives way to what is told of an effect: of itself, or of a part of it.
+fn is_replaced(asked: &Asked<'_>, usual: DeflectionQuantity) -> bool {
+    let parts = PARTS_OF_STIFFNESS.into_iter().filter(|_| usual == DeflectionQuantity::Stiffness);
+    std::iter::once(usual).chain(parts).any(|quantity| quantity.is_brought(asked))
 }
 
 fn pairs(stated: &Uncertainty) -> Vec<Pair<'_, DeflectionQuantity>> {
     stated.correlations.iter().map(|pair| (&pair.between[..], pair.coefficient)).collect()
 }
 
-/// What is cut with where the quantities come to this.
-pub(super) fn draw_of(of: &Uncertainties<DeflectionQuantity>, values: &[f64]) -> Draw {
-    let mut draw = Draw::STATED;
+/// What is cut with where the quantities come to this; `effects` are those that the job states.
+pub(super) fn draw_of(
+    of: &Uncertainties<DeflectionQuantity>,
+    effects: &[DeflectionEffect],
+    values: &[f64],
+) -> Result<Draw, Failure> {
+    let mut draw = Draw { effects: of.effects.effects(effects, of.of_effects(values))?, ..Draw::STATED };
     for (one, value) in of.of.iter().zip(values) {
         one.quantity.put(*value, &mut draw);
     }
-    draw
+    Ok(draw)
 }
 
-impl Uncertainty {
-    /// Relative standard uncertainty of force and of stiffness: as a quantity states it, else in percent.
-    pub(crate) fn of_force_and_stiffness(&self) -> [f64; 2] {
-        let of = |quantity, percent: f64| {
-            let stated = self.quantities.iter().find(|one| one.quantity == quantity);
-            stated.map_or(percent / 100.0, |one| one.distribution.relative())
+impl Asked<'_> {
+    /// Relative standard uncertainty of force and of stiffness: as a quantity states it, else in percent; `None` where what is not
+    /// known of the effects takes its place.
+    pub(crate) fn of_force_and_stiffness(&self) -> [Option<f64>; 2] {
+        let Uncertainty { quantities, force_percent, stiffness_percent, .. } = self.uncertainty;
+        let of = |quantity, percent: f64| match quantities.iter().find(|one| one.quantity == quantity) {
+            Some(one) => Some(one.distribution.relative()),
+            None => (!is_replaced(self, quantity)).then_some(percent / 100.0),
         };
-        [of(DeflectionQuantity::Force, self.force_percent), of(DeflectionQuantity::Stiffness, self.stiffness_percent)]
+        [of(DeflectionQuantity::Force, *force_percent), of(DeflectionQuantity::Stiffness, *stiffness_percent)]
+    }
+
+    /// The effects where one standard deviation of what is not known of them acts, up and down; each is independent of the next.
+    pub(crate) fn off_effects(&self) -> Result<Vec<[Vec<DeflectionEffect>; 2]>, Failure> {
+        let open = OpenEffects::of(self.effects, &self.uncertainty.effects);
+        let off = |score: usize, by: f64| -> Result<Vec<DeflectionEffect>, Failure> {
+            let independent: Vec<f64> = (0..open.dimensions()).map(|own| if own == score { by } else { 0.0 }).collect();
+            Ok(open.effects(self.effects, &open.values(&independent))?.unwrap_or_default())
+        };
+        (0..open.dimensions()).map(|score| Ok([off(score, 1.0)?, off(score, -1.0)?])).collect()
     }
 }
 
@@ -254,6 +297,8 @@ pub(crate) fn check(asked: &Asked<'_>, violations: &mut Violations) {
     let stated = asked.uncertainty;
     let quantities: Vec<_> = stated.quantities.iter().map(|one| (one.quantity, &one.distribution)).collect();
     check_quantities(&quantities, violations);
+    certainty::open::check(asked.effects, &stated.effects, violations);
+    check_brought(quantities.iter().map(|(quantity, _)| *quantity), |one| one.is_brought(asked), violations);
     check_correlations(&pairs(stated), || uncertainties(asked).err(), violations);
 }
 

@@ -1,7 +1,7 @@
 //! What is said of the probability that diameters keep their limits.
 
 use crate::calculator::{Finding, Message};
-use crate::certainty::{Conformance, Improvement};
+use crate::certainty::{Conformance, Improvement, with_largest};
 
 use super::{Asked, acceptance};
 
@@ -13,17 +13,12 @@ pub(crate) const WARNING_CODES: &[&str] = &["improbable", "gauge_too_uncertain"]
 /// What is said of it, most important first.
 pub(crate) fn said(conformance: &Conformance) -> Vec<Message> {
     let joint = &conformance.joint;
-    let mut first = Message::new("probably_good")
+    let first = Message::new("probably_good")
         .with("percent", 100.0 * joint.probability)
         .with("wanted_percent", 100.0 * joint.wanted)
         .with("met", if joint.met { "yes" } else { "no" })
         .with("common_percent", 100.0 * conformance.setup.share_common_to_all);
-    // Where quantities go together none has a share of its own.
-    if let Some(largest) = conformance.contributions.iter().find(|one| one.share_of_variance.is_some()) {
-        first = first
-            .with("quantity", largest.quantity.clone())
-            .with("share_percent", 100.0 * largest.share_of_variance.unwrap_or(0.0));
-    }
+    let first = with_largest(first, &conformance.contributions);
     let advised = conformance.advice.iter().map(|advice| match *advice {
         Improvement::ShiftAim { shift_um, joint_probability, .. } => {
             Message::new("aim_tells").with("shift_um", shift_um).with("percent", 100.0 * joint_probability)

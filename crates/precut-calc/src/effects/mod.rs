@@ -8,6 +8,7 @@ mod deflection;
 mod expression;
 mod fixture;
 mod machinability;
+mod open;
 mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
@@ -17,6 +18,8 @@ pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{
     CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,
 };
+pub(crate) use open::{Catalogued, has_parameter};
+pub use open::{JointUncertainty, ParameterMove};
 pub(crate) use ring::whole;
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
 

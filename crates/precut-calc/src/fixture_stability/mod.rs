@@ -67,7 +67,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 11,
+        version: 12,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \
@@ -202,6 +202,7 @@ const CODES: Codes = Codes {
         job::check::CODES,
         DISTRIBUTION_CODES,
         QUANTITY_CODES,
+        crate::certainty::open::CODES,
         MISSING_CODES,
         &["time_missing", "opened_without_clamp_force"],
     ],

@@ -14,7 +14,7 @@ use crate::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, GAUGE_STEP_MM, Measure,
     PreparedDeflection, QUANTITIES, RELATIVE_STEP, Theory, columns_of_runs, difference, longest_run,
 };
-use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect, JointUncertainty};
 
 use super::ProgramCompensation;
 use super::job::{Job, SupportLines};
@@ -174,6 +174,7 @@ impl ForwardModel for ProgramCompensation {
     type Prepared = PreparedProgram;
 
     const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &[];
 
@@ -186,8 +187,14 @@ impl ForwardModel for ProgramCompensation {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        let mut job = Job { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(

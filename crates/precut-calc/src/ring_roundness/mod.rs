@@ -59,7 +59,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \
@@ -406,7 +406,7 @@ fn basis(job: &Job, outcome: &Outcome) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[job::check::CODES, DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES],
+    faults: &[job::check::CODES, DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES, crate::certainty::open::CODES],
     failures: &[model::simulate::FAILURE_CODES, &["no_end_position"]],
     warnings: &[answer::advice::WARNING_CODES, answer::conformance::WARNING_CODES],
     explanations: &[answer::advice::EXPLANATION_CODES, answer::conformance::EXPLANATION_CODES],

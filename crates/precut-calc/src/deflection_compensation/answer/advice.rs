@@ -243,13 +243,7 @@ pub(in crate::deflection_compensation) fn explanation(
             _ => Message::new("path_has_gaps").with("stations", without_command(outcome)),
         });
     }
-    let [force, stiffness] = job.uncertainty.of_force_and_stiffness();
-    said.push(
-        Message::new("uncertain_by")
-            .with("uncertainty_um", seen_along.uncertainty_um)
-            .with("force_percent", 100.0 * force)
-            .with("stiffness_percent", 100.0 * stiffness),
-    );
+    said.push(uncertain_by(job, seen_along.uncertainty_um));
     said.extend(worthwhile_rest(job, outcome));
     let overcut =
         outcome.one_step.iter().flat_map(|step| &step.diameter_error_um).flatten().copied().fold(0.0, f64::min);
@@ -262,6 +256,17 @@ pub(in crate::deflection_compensation) fn explanation(
     }
     said.extend(outcome.included_automatically.iter().map(|automatic| automatic.said(job)));
     said
+}
+
+/// By how much the diameter is uncertain, and of what.
+fn uncertain_by(job: &Job, uncertainty_um: f64) -> Message {
+    let said = Message::new("uncertain_by")
+        .with("uncertainty_um", uncertainty_um)
+        .with("effects", if job.uncertainty.effects.is_empty() { "no" } else { "yes" });
+    let shares = ["force_percent", "stiffness_percent"].into_iter().zip(job.asked().of_force_and_stiffness());
+    shares
+        .filter_map(|(name, share)| Some((name, 100.0 * share?)))
+        .fold(said, |said, (name, share)| said.with(name, share))
 }
 
 /// Whether the shaft that is cut along the compensated path keeps the tolerance of its size, as surely as that is known;

@@ -130,7 +130,7 @@ pub(in crate::deflection_compensation) fn settled<'a>(
             weight: of_job.weight,
         };
         let estimates = Estimates::of(&job, &sampled, &acting, &stage, wanted)?;
-        let limit_um = limit_um(&job, &acting, &stage);
+        let limit_um = limit_um(&job, &sampled, &acting, &stage)?;
         let mut found = Vec::new();
         for switch in still_open() {
             if let Some(change_um) = switch.above_um(limit_um, &estimates)? {
@@ -169,8 +169,10 @@ fn tolerance_um(job: &Job) -> Option<f64> {
 }
 
 /// Change of the diameter from which on an effect acts, um; less than a tenth of a step of the control never matters.
-fn limit_um(job: &Job, acting: &Acting, stage: &Stage) -> f64 {
-    let measure_um =
-        tolerance_um(job).unwrap_or_else(|| uncertainty_um(job, acting, stage).into_iter().fold(0.0, f64::max));
-    SHARE * measure_um.max(job.path.increment_um)
+fn limit_um(job: &Job, grid: &Grid, acting: &Acting, stage: &Stage) -> Result<f64, Failure> {
+    let measure_um = match tolerance_um(job) {
+        Some(tolerance_um) => tolerance_um,
+        None => uncertainty_um(job, grid, acting, stage)?.into_iter().fold(0.0, f64::max),
+    };
+    Ok(SHARE * measure_um.max(job.path.increment_um))
 }

@@ -1,14 +1,16 @@
 //! From a computed cut to the columns of the answer: moved where they are the same numbers, rescaled in place where
 //! only the unit differs. At ten thousand stations fresh arrays cost as much as the physics.
 
+use crate::calculator::Failure;
 use crate::deflection_compensation::UM_PER_MM;
 use crate::deflection_compensation::answer::output::StationColumns;
 use crate::deflection_compensation::job::acting::Acting;
+use crate::deflection_compensation::job::grid::Grid;
 use crate::deflection_compensation::job::input::{Detail, Job};
 use crate::deflection_compensation::model::laws::Loads;
-use crate::deflection_compensation::model::stage::Stage;
+use crate::deflection_compensation::model::stage::{Stage, line_of};
 use crate::deflection_compensation::model::yielding::{Line, Radii, at};
-use crate::diameters::Uncertainty;
+use crate::effects::DeflectionEffect;
 
 /// Diameter errors at the stations, um.
 pub(in crate::deflection_compensation) struct Errors {
@@ -95,10 +97,15 @@ fn doubled(mut column: Vec<Option<f64>>) -> Vec<Option<f64>> {
 }
 
 /// Standard uncertainty of the diameter, um (`deflection/7`): to first order about the compensated cut, what force and
-/// compliances each make of the radius, and the scatter from trace to trace.
-pub(in crate::deflection_compensation) fn uncertainty_um(job: &Job, acting: &Acting, stage: &Stage) -> Vec<f64> {
+/// compliances each make of the radius, what is not known of the effects, and the scatter from trace to trace.
+pub(in crate::deflection_compensation) fn uncertainty_um(
+    job: &Job,
+    grid: &Grid,
+    acting: &Acting,
+    stage: &Stage,
+) -> Result<Vec<f64>, Failure> {
     let Stage { line, radii, cut, .. } = stage;
-    let relative = Relative::of(&job.uncertainty);
+    let relative = Relative::of(job);
     let scatter = 2.0 * acting.scatter_mm * UM_PER_MM;
     let mut of_stations = Vec::with_capacity(radii.target.len());
     for (loads, run) in cut.loads.runs() {
@@ -119,7 +126,32 @@ pub(in crate::deflection_compensation) fn uncertainty_um(job: &Job, acting: &Act
             *um = um.hypot(scatter);
         }
     }
-    of_stations
+    for [up, down] in job.asked().off_effects()? {
+        let [up, down] = [radii_mm(job, grid, stage, &up)?, radii_mm(job, grid, stage, &down)?];
+        for (((um, up), down), copying) in of_stations.iter_mut().zip(up).zip(down).zip(&cut.planned_copying) {
+            *um = um.hypot(diameter_um(0.5 * (up - down), *copying));
+        }
+    }
+    Ok(of_stations)
+}
+
+/// What other effects make of the radius that an unchanged command gives at an unchanged depth, mm.
+fn radii_mm(job: &Job, grid: &Grid, stage: &Stage, effects: &[DeflectionEffect]) -> Result<Vec<f64>, Failure> {
+    let acting = Acting::of(effects, &job.conditions, job.cut.feed_direction);
+    let Stage { radii, cut, regime, step, .. } = stage;
+    let (_, line) = line_of(job, grid, &acting, regime, step, radii)?;
+    let radius_mm = |(i, depth_mm): (usize, &f64)| {
+        let opening = line.opening(i, &line.nominal_loads(i, *depth_mm));
+        let [sine, cosine] = aside(at(&cut.z_mm, i), radii.target[i]);
+        cosine * opening.y_mm + sine * opening.z_mm
+    };
+    Ok(cut.nominal_depth_mm.iter().enumerate().map(radius_mm).collect())
+}
+
+/// Sine and cosine of the direction in which the axis lies aside; without a command it lies aside by more than the radius.
+fn aside(z_mm: f64, target_mm: f64) -> [f64; 2] {
+    let sine = (z_mm / target_mm).clamp(-1.0, 1.0);
+    [sine, ((1.0 - sine) * (1.0 + sine)).sqrt()]
 }
 
 /// Of the diameter, where the copying factor answers a change of the radius.
@@ -135,8 +167,8 @@ struct Relative {
 }
 
 impl Relative {
-    fn of(stated: &Uncertainty) -> Self {
-        let [force, stiffness] = stated.of_force_and_stiffness();
+    fn of(job: &Job) -> Self {
+        let [force, stiffness] = job.asked().of_force_and_stiffness().map(Option::unwrap_or_default);
         Self { force, stiffness, both: force.hypot(stiffness) }
     }
 
@@ -144,9 +176,7 @@ impl Relative {
     /// dr = (cos dY + sin dZ) where the axis lies aside by sin = Z/r_t.
     fn radius_mm(&self, line: &Line, i: usize, loads: &Loads, z_mm: f64, target_mm: f64) -> f64 {
         let parts = line.parts(i, loads);
-        // Without a command the axis lies aside by more than the radius.
-        let sine = (z_mm / target_mm).clamp(-1.0, 1.0);
-        let cosine = ((1.0 - sine) * (1.0 + sine)).sqrt();
+        let [sine, cosine] = aside(z_mm, target_mm);
         let by_force = parts.force_mm + parts.couple_mm;
         let force = cosine * by_force + sine * line.tangential_by_force_mm(i, loads);
         let stiffness = cosine * (by_force + parts.sag_mm) + sine * z_mm;

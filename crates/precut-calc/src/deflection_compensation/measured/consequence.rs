@@ -2,13 +2,16 @@
 
 use rayon::prelude::*;
 
-use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Monitor, Quiet, Rows};
+use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel, Monitor, Quiet, Rows, ToldEffects};
+use crate::diameters::{self, Asked, Uncertainty};
 use crate::effects::DeflectionEffect;
 
-use crate::deflection_compensation::DeflectionCompensation;
 use crate::deflection_compensation::answer::output::Path;
+use crate::deflection_compensation::job::acting::Acting;
+use crate::deflection_compensation::job::grid::Grid;
 use crate::deflection_compensation::job::input::{Detail, IncludeMode, Job};
 use crate::deflection_compensation::measured::forward::{CommandedPoint, DeflectionPoint, DeflectionRun};
+use crate::deflection_compensation::{DeflectionCompensation, cuts_at_aim};
 
 /// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between
 /// them is missed by less than 0.03 % of its height, (pi/128)^2/2.
@@ -61,6 +64,50 @@ pub(in crate::deflection_compensation) fn consequences(
     ])
 }
 
+/// Whether the shafts that are cut along that path keep all limits, each with its own effects and with what else is uncertain.
+pub(super) fn parts_kept(
+    job: &Job,
+    runs: &[DeflectionRun],
+    believed: &[DeflectionEffect],
+    acting: &[Vec<DeflectionEffect>],
+    told: &ToldEffects<'_, DeflectionEffect>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Vec<bool>>, Failure> {
+    if job.tolerance.is_none() {
+        return Ok(None);
+    }
+    let planned = believing(job, &runs.first().cloned().unwrap_or_default(), believed);
+    let grid = Grid::of(&planned);
+    let of_path = Acting::of(&planned.effects, &planned.conditions, planned.cut.feed_direction);
+    let driven = match cuts_at_aim(&planned, &grid, &of_path, &mut |_, _, _| (), &Quiet(monitor)) {
+        Ok((driven, _)) => driven,
+        Err(Failure::OutOfModel(_)) => return Ok(None),
+        Err(failure) => return Err(failure),
+    };
+    let Some(rehearsal) = &driven.rehearsal else { return Ok(None) };
+    // What is told comes first, as its uncertainty counts; of the others what scatters is asked for.
+    let is_other = |effect: &&DeflectionEffect| told.effects.iter().all(|own| own.kind() != effect.kind());
+    let others = acting.first().into_iter().flatten().filter(is_other);
+    let effects: Vec<DeflectionEffect> = told.effects.iter().chain(others).cloned().collect();
+    let uncertainty = Uncertainty { effects: told.open.to_vec(), ..job.uncertainty.clone() };
+    let asked = Asked { uncertainty: &uncertainty, effects: &effects, ..planned.asked() };
+    Ok(Some(diameters::kept(rehearsal, &asked, acting, monitor)?))
+}
+
+/// The job of one cut from the stock with these effects beside its own: it takes the switches as they stand, as the model that
+/// predicts does.
+fn believing(job: &Job, conditions: &DeflectionRun, believed: &[DeflectionEffect]) -> Job {
+    let mut job = job.clone();
+    job.passes.clear();
+    job.detail = Detail::Full;
+    job.include.mode = IncludeMode::AsStated;
+    job.effects.extend_from_slice(believed);
+    let own = &mut job.conditions;
+    own.tool_path_at_start_m = own.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
+    own.warm_time_at_start_min = own.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
+    job
+}
+
 /// The corners of the path driven with these effects beside the job's own; `None` where it is not complete.
 pub(in crate::deflection_compensation) fn compensated(
     job: &Job,
@@ -68,14 +115,7 @@ pub(in crate::deflection_compensation) fn compensated(
     believed: &[DeflectionEffect],
     monitor: &dyn Monitor,
 ) -> Result<Option<Vec<CommandedPoint>>, Failure> {
-    let mut job = job.clone();
-    job.passes.clear();
-    job.detail = Detail::Full;
-    // The path of the model that predicts: it takes the switches as they stand.
-    job.include.mode = IncludeMode::AsStated;
-    job.effects.extend_from_slice(believed);
-    job.conditions.tool_path_at_start_m = job.conditions.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
-    job.conditions.warm_time_at_start_min = job.conditions.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
+    let job = believing(job, conditions, believed);
     let path = match DeflectionCompensation::run(&job, &Quiet(monitor)) {
         Ok(answer) => answer.output.path,
         Err(Failure::OutOfModel(_)) => return Ok(None),

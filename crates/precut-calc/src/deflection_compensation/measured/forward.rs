@@ -6,10 +6,10 @@ use utoipa::ToSchema;
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
     JacobianColumn, KnownOver, Limits, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    TellingRun, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
+    TellingRun, ToldEffects, Unnamed, Watched, checkpoint, values_by_name, values_of_formula,
 };
 use crate::diameters::{Aim, Tolerance};
-use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint, JointUncertainty};
 use crate::num::beam::Profile;
 use crate::shaft::places;
 
@@ -20,7 +20,7 @@ use crate::deflection_compensation::job::check::outside_shaft;
 use crate::deflection_compensation::job::grid::{Grid, interpolate};
 use crate::deflection_compensation::job::input::{FeedDirection, IncludeMode, Job, Stations, Theory};
 use crate::deflection_compensation::job::structure::{Structure, Variant};
-use crate::deflection_compensation::measured::consequence::{compensated, consequences, corners};
+use crate::deflection_compensation::measured::consequence::{compensated, consequences, corners, parts_kept};
 use crate::deflection_compensation::measured::hypotheses::{
     Experiment, chuck_scale_n_mm_per_rad, design, remainder_name,
 };
@@ -228,6 +228,7 @@ impl ForwardModel for DeflectionCompensation {
     type Prepared = PreparedDeflection;
 
     const CAUSES: &'static [Cause] = DEFLECTION_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["depth_mm", "feed_mm_per_rev", "speed_m_per_min"];
 
@@ -256,8 +257,14 @@ impl ForwardModel for DeflectionCompensation {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        let mut job = Job { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(
@@ -434,6 +441,19 @@ impl Diagnosable for DeflectionCompensation {
         monitor: &dyn Monitor,
     ) -> Result<Vec<Consequence>, Failure> {
         consequences(job, runs, believed, acting, monitor)
+    }
+
+    const PARTS_DRAWN: usize = 500;
+
+    fn parts_kept(
+        job: &Job,
+        runs: &[DeflectionRun],
+        believed: &[DeflectionEffect],
+        acting: &[Vec<DeflectionEffect>],
+        told: &ToldEffects<'_, DeflectionEffect>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<bool>>, Failure> {
+        parts_kept(job, runs, believed, acting, told, monitor)
     }
 
     fn from_other_end(job: &Job, point: &DeflectionPoint) -> Option<DeflectionPoint> {

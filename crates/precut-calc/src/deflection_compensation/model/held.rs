@@ -162,7 +162,10 @@ impl Holding {
 
     /// The same, not quite as it is stated.
     pub(crate) fn drawn(&self, draw: &Draw) -> Self {
-        let mut drawn = Self { draw: *draw, ..self.clone() };
+        let mut drawn = Self { draw: Draw { effects: None, ..draw.clone() }, ..self.clone() };
+        if let Some(effects) = &draw.effects {
+            drawn.effects.clone_from(effects);
+        }
         draw.yield_in(&mut drawn.supports, &mut drawn.carriage);
         drawn
     }
@@ -194,7 +197,7 @@ impl Holding {
         variant.section = Section::Mixed;
         let structure = Structure::of(&job, &variant)?;
         let length_mm = slices.iter().map(|slice| slice.length_mm).sum();
-        Ok(Held { draw: self.draw, job, acting, structure, direction, length_mm })
+        Ok(Held { draw: self.draw.clone(), job, acting, structure, direction, length_mm })
     }
 }
 

@@ -82,7 +82,10 @@ impl<'a> Rehearsal<'a> {
         }
         let mut job = self.job.clone();
         draw.yield_in(&mut job.supports, &mut job.carriage);
-        let mut acting = self.acting.clone();
+        let mut acting = match &draw.effects {
+            Some(effects) => Acting::of(effects, &job.conditions, job.cut.feed_direction),
+            None => self.acting.clone(),
+        };
         acting.structure.flexibility /= draw.youngs_modulus;
         let (_, mut line) = line_of(&job, &self.grid, &acting, &cut.regime, &cut.step, &cut.radii)?;
         line.widen_gaps(draw.rest_gap_mm);

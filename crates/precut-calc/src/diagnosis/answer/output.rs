@@ -9,9 +9,9 @@ use utoipa::openapi::schema::{ObjectBuilder, SchemaType, Type};
 
 use crate::diagnosis::answer::blunder::BlunderReport;
 use crate::diagnosis::answer::classes::ClassReport;
-use crate::diagnosis::model::downstream::DownstreamReport;
+use crate::diagnosis::model::downstream::{DownstreamReport, GoodPartsReport};
 use crate::diagnosis::model::extension::ExtensionKind;
-use crate::diagnosis::model::known::JointUncertainty;
+use crate::effects::JointUncertainty;
 
 /// What the measurements say about the base model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -77,6 +77,9 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     /// What comes of deciding with either model, where the extended one is right; empty where the base is not extended, or
     /// where the job decides nothing.
     pub downstream: Vec<DownstreamReport>,
+    /// With which probability the next part keeps all limits of the base job, made with either model; absent where the base is not
+    /// extended, and where the job limits nothing of a part.
+    pub good_parts: Option<GoodPartsReport>,
     /// The run that would best part the leading set from its strongest rival.
     #[schema(inline)]
     pub next_measurement: Option<NextReport<R>>,

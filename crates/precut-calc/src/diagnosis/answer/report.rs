@@ -2,7 +2,7 @@
 
 use crate::calculator::{
     Answer, Diagnosable, Failure, Hypothesis, Inapplicability, KnownOver, Measurement, Message, Monitor, Prediction,
-    Quantity, Smooth, Value,
+    Quantity, Smooth, ToldEffects, Value,
 };
 use crate::diagnosis::answer::blunder::blunders;
 use crate::diagnosis::answer::classes;
@@ -17,7 +17,7 @@ use crate::diagnosis::base::Bound;
 use crate::diagnosis::calculator::{JobOf, Measured, ResultOf, stage};
 use crate::diagnosis::causes::subject::{Setting, Subject};
 use crate::diagnosis::input::DiagnosisOptions;
-use crate::diagnosis::model::downstream::downstream;
+use crate::diagnosis::model::downstream::{downstream, good_parts};
 use crate::diagnosis::model::extension::{Extension, ExtensionKind};
 use crate::diagnosis::model::gain::{Gain, gain};
 use crate::diagnosis::model::next::{NextMeasurement, next_measurement};
@@ -91,10 +91,13 @@ pub(in crate::diagnosis) fn answer<M: Diagnosable>(
         deviation: if is_extended { extension.deviation(&weighing)? } else { None },
     };
     let is_decided = matches!(view.class(), VerdictClass::Named | VerdictClass::Confounded);
-    let downstream = if is_decided || extension.kind == ExtensionKind::Remainder {
-        downstream(job, &places.runs, bound, &weighing, &extension, monitor)?
+    let effects_uncertainty = extension.open(&weighing, |believed| bound.effects_of(believed))?;
+    let (downstream, good_parts) = if is_decided || extension.kind == ExtensionKind::Remainder {
+        let told = ToldEffects { effects: &effects, open: &effects_uncertainty };
+        let downstream = downstream(job, &places.runs, bound, &weighing, &extension, monitor)?;
+        (downstream, good_parts(job, &places.runs, bound, &weighing, &extension, &told, monitor)?)
     } else {
-        Vec::new()
+        (Vec::new(), None)
     };
     let (contributions, collinearity) =
         if refusal.is_none() { view.contributions(job.options.negligible_below)? } else { (Vec::new(), None) };
@@ -103,7 +106,6 @@ pub(in crate::diagnosis) fn answer<M: Diagnosable>(
     let with = extended.prediction.as_deref();
     let classes =
         classes::report(bound, &weighing, measured, with, &believed.settings, gain.as_ref(), (seed, monitor))?;
-    let effects_uncertainty = extension.open(&weighing, |believed| bound.effects_of(believed))?;
     // Of classes a root mean square means nothing.
     let gain = gain.filter(|_| classes.is_none());
     let output = DiagnosisResult {
@@ -132,6 +134,7 @@ pub(in crate::diagnosis) fn answer<M: Diagnosable>(
         gain: gain.as_ref().map(gain_report),
         classes,
         downstream,
+        good_parts,
         next_measurement: next.map(|next| view.next_report(next)),
         rows: row_columns::<M>(job, used, &foundation, &weighing, &extended),
         outlying_runs: view.outlying(gain.as_ref()),

@@ -66,6 +66,7 @@ pub(in crate::diagnosis) const EXPLANATION_CODES: &[&str] = &[
     "diagnosis_several_values",
     "diagnosis_changed",
     "diagnosis_downstream",
+    "diagnosis_good_parts",
 ];
 
 /// What is odd about the rows, and what was asked for and not done.
@@ -304,6 +305,12 @@ pub(in crate::diagnosis) fn explanation<E: utoipa::ToSchema, R: utoipa::ToSchema
             .with("extended", downstream.extended.mean)
             .with("low", downstream.extended.interval_95[0])
             .with("high", downstream.extended.interval_95[1])
+    }));
+    said.extend(output.good_parts.map(|good| {
+        Message::new("diagnosis_good_parts")
+            .with("base_percent", 100.0 * good.base.probability)
+            .with("extended_percent", 100.0 * good.extended.probability)
+            .with("error_percent", 100.0 * good.base.numerical_error.max(good.extended.numerical_error))
     }));
     said
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 use utoipa::ToSchema;
 
-use crate::calculator::{Consequence, Diagnosable, Failure, Monitor, checkpoint};
+use crate::calculator::{Consequence, Diagnosable, Failure, Monitor, ToldEffects, checkpoint};
 use crate::diagnosis::base::Bound;
 use crate::diagnosis::calculator::{JobOf, base_of};
 use crate::diagnosis::causes::ranking::SetWeight;
@@ -66,24 +66,8 @@ pub(in crate::diagnosis) fn downstream<M: Diagnosable>(
     extension: &Extension<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<DownstreamReport>, Failure> {
-    let mut random = Gaussian { random: Pcg64::seed_from_u64(u64::from(job.options.seed)), normal: Normal::standard() };
-    let dof = weighing.noise.dof;
-    let draws: Vec<Belief> = if let Some(term) = &extension.term {
-        let directions = term.directions();
-        (0..DRAWS).map(|_| random.beside(bound, &extension.believed, &directions, dof)).collect()
-    } else {
-        let mut parts = Vec::with_capacity(extension.parts.len());
-        for &(share, set) in &extension.parts {
-            let open = weighing.fit(&set.members).and_then(|fit| Open::of(bound, set, fit));
-            let Some(open) = open else { return Ok(Vec::new()) };
-            parts.push((share, open));
-        }
-        if parts.is_empty() {
-            return Ok(Vec::new());
-        }
-        (0..DRAWS).map(|_| Belief::of(&random.one_of(&parts).draw(dof, &mut random))).collect()
-    };
-    let mut acting = draws.iter().map(|believed| bound.acting(believed)).collect::<Result<Vec<_>, _>>()?;
+    let mut random = Gaussian::of(job.options.seed);
+    let Some(mut acting) = drawn(DRAWS, bound, weighing, extension, &mut random)? else { return Ok(Vec::new()) };
     for effects in &mut acting {
         effects.extend(M::allowed(&job.allowances, &mut || random.next()));
     }
@@ -107,6 +91,93 @@ pub(in crate::diagnosis) fn downstream<M: Diagnosable>(
         })
     });
     Ok(both.collect())
+}
+
+/// Effects that act, so many draws of what the rows leave open of the extended model; `None` where one of its sets was not refined.
+fn drawn<M: Diagnosable>(
+    count: usize,
+    bound: &Bound<'_, M>,
+    weighing: &Weighing<'_>,
+    extension: &Extension<'_>,
+    random: &mut Gaussian,
+) -> Result<Option<Vec<Vec<M::Effect>>>, Failure> {
+    let dof = weighing.noise.dof;
+    let draws: Vec<Belief> = if let Some(term) = &extension.term {
+        let directions = term.directions();
+        (0..count).map(|_| random.beside(bound, &extension.believed, &directions, dof)).collect()
+    } else {
+        let mut parts = Vec::with_capacity(extension.parts.len());
+        for &(share, set) in &extension.parts {
+            let open = weighing.fit(&set.members).and_then(|fit| Open::of(bound, set, fit));
+            let Some(open) = open else { return Ok(None) };
+            parts.push((share, open));
+        }
+        if parts.is_empty() {
+            return Ok(None);
+        }
+        (0..count).map(|_| Belief::of(&random.one_of(&parts).draw(dof, random))).collect()
+    };
+    draws.iter().map(|believed| bound.acting(believed)).collect::<Result<Vec<_>, _>>().map(Some)
+}
+
+/// With which probability the next part keeps all limits of the base job, where the extended model is right within what the rows
+/// leave open of it, with what else the base job says is uncertain.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct GoodPartsReport {
+    /// Draws of both.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub draws: u32,
+    /// Made with the base.
+    pub base: ProbablyGood,
+    /// Made with the extended model.
+    pub extended: ProbablyGood,
+}
+
+/// The probability of a good part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ProbablyGood {
+    /// Share of the draws that keep every limit.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability: f64,
+    /// Twice its standard error.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub numerical_error: f64,
+}
+
+impl ProbablyGood {
+    /// The standard error is that of a share with one draw more on either side (Laplace's rule): of 0 of 500 it is not 0.
+    fn of(kept: &[bool]) -> Self {
+        let (good, count) = (kept.iter().filter(|good| **good).count() as f64, kept.len() as f64);
+        let chance = (good + 1.0) / (count + 2.0);
+        Self { probability: good / count, numerical_error: 2.0 * (chance * (1.0 - chance) / count).sqrt() }
+    }
+}
+
+/// The probability that the next part is good, made with the base and with the extended model, on common draws. `None` where a set was
+/// not refined, and where nothing of a part is limited.
+pub(in crate::diagnosis) fn good_parts<M: Diagnosable>(
+    job: &JobOf<M>,
+    runs: &[M::Run],
+    bound: &Bound<'_, M>,
+    weighing: &Weighing<'_>,
+    extension: &Extension<'_>,
+    told: &ToldEffects<'_, M::Effect>,
+    monitor: &dyn Monitor,
+) -> Result<Option<GoodPartsReport>, Failure> {
+    if M::PARTS_DRAWN == 0 {
+        return Ok(None);
+    }
+    let mut random = Gaussian::of(job.options.seed);
+    let Some(acting) = drawn(M::PARTS_DRAWN, bound, weighing, extension, &mut random)? else { return Ok(None) };
+    let (base_job, _) = base_of::<M>(job);
+    let made = |believed: &Belief| -> Result<Option<ProbablyGood>, Failure> {
+        let kept = M::parts_kept(&base_job, runs, &bound.acting(believed)?, &acting, told, monitor)?;
+        checkpoint(monitor)?;
+        Ok(kept.map(|kept| ProbablyGood::of(&kept)))
+    };
+    let (base, extended) = (made(&Belief::default())?, made(&extension.believed)?);
+    let draws = u32::try_from(M::PARTS_DRAWN).unwrap_or(u32::MAX);
+    Ok(base.zip(extended).map(|(base, extended)| GoodPartsReport { draws, base, extended }))
 }
 
 /// What the rows leave open of a set: Student's t about its optimum, cut at the bounds. What a grid of shapes widens is
@@ -149,6 +220,10 @@ struct Gaussian {
 }
 
 impl Gaussian {
+    fn of(seed: u32) -> Self {
+        Self { random: Pcg64::seed_from_u64(u64::from(seed)), normal: Normal::standard() }
+    }
+
     fn next(&mut self) -> f64 {
         // In the open interval: both ends are infinite.
         let share = self.random.random_range(f64::EPSILON..1.0);

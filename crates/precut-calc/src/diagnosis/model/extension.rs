@@ -10,9 +10,10 @@ use crate::calculator::{Failure, Hypothesis, Treatment};
 use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::{Belief, Setting};
 use crate::diagnosis::model::gain::{Gain, predicting};
-use crate::diagnosis::model::known::{Direction, JointUncertainty, directions, left_open};
+use crate::diagnosis::model::known::{Direction, directions, left_open};
 use crate::diagnosis::model::term::Term;
 use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::effects::JointUncertainty;
 
 /// How far the average model may be, root mean square in units of the scatter, from the average of what the sets predict.
 const AS_THE_AVERAGE: f64 = 0.5;

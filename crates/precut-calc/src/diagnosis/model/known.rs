@@ -3,44 +3,19 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, DMatrix};
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
-use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Prediction};
 use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::Belief;
 use crate::diagnosis::verdict::weigh::Weighing;
+use crate::effects::{JointUncertainty, ParameterMove};
 
 /// The field that is the same a turn further.
 const PHASE: &str = "phase_rad";
 /// Share of a standard deviation by which parameters are moved for a divided difference.
 const STEP: f64 = 0.01;
-
-/// Parameters of effects that are unsure together: where the first is off by `by`, so is each of the others. One entry is
-/// independent of the next.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct JointUncertainty {
-    /// How far each parameter moves, at one standard deviation.
-    #[schema(min_items = 1, max_items = 128)]
-    pub moves: Vec<ParameterMove>,
-}
-
-/// How far a parameter moves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ParameterMove {
-    /// Number of the effect in its list, from 1.
-    #[schema(minimum = 1, maximum = 1000, example = 1, extensions(("x-symbol" = json!("i")), ("x-unit" = json!("1"))))]
-    pub effect: u32,
-    /// Field of the effect; of a list the place in it from 0 and the field there: `profile/2/error_um`.
-    #[schema(max_length = 64, example = "delta_um_per_n")]
-    pub parameter: String,
-    /// By how much, in the unit of the field.
-    #[schema(minimum = -1e15, maximum = 1e15, example = 0.001, extensions(("x-symbol" = json!("u")), ("x-unit" = json!("1"))))]
-    pub by: f64,
-}
 
 /// The effects of a base, and what is not known of them.
 #[derive(Debug, Clone)]
@@ -87,11 +62,6 @@ impl<E: Serialize + DeserializeOwned> Known<E> {
         };
         self.unsure.iter().map(column).collect()
     }
-}
-
-/// Whether an effect has a number of that name.
-pub(in crate::diagnosis) fn has_parameter(effect: &impl Serialize, parameter: &str) -> bool {
-    serde_json::to_value(effect).is_ok_and(|fields| fields.pointer(&format!("/{parameter}")).is_some_and(Value::is_f64))
 }
 
 /// One standard deviation of something that is open.

@@ -29,6 +29,8 @@ pub(in crate::feed_schedule) struct Case {
     pub passes_time_min: f64,
     /// By how much less of an edge's median life is used at the job's risk, in its logarithm.
     pub edge_margin: f64,
+    /// What edges that are worn out before they are changed cost on average, money per edge.
+    pub edge_failures_cost: f64,
 }
 
 /// A zone, or one of its passes.
@@ -319,6 +321,7 @@ impl Case {
             couplings: Vec::new(),
             passes_time_min: 0.0,
             edge_margin: 0.0,
+            edge_failures_cost: job.risk.cost_per_edge(),
         };
         if let (Some(split), Some(plan)) = (split, &job.passes) {
             case.passes_time_min =

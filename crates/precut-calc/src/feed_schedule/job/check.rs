@@ -242,6 +242,7 @@ fn check_needs(job: &Job, violations: &mut Violations) {
         }
         Goal::Cost { tool_change_time_min, edge_cost, .. } => {
             need(*tool_change_time_min > 0.0 || *edge_cost > 0.0, Output::ToolLife, "edge_cost");
+            need(job.risk.cost_per_edge() > 0.0, Output::ToolLife, "edge_failure_cost");
         }
         Goal::Deflection {} => need(true, Output::ForceY, "objective"),
         Goal::Roughness {} => need(true, Output::Roughness, "objective"),

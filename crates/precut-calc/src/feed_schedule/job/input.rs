@@ -172,6 +172,10 @@ pub struct Zone {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1e-4, maximum = 20.0, example = 0.12, extensions(("x-unit" = json!("mm/rev")), ("x-symbol" = json!("S_max"))))]
     pub feed_max_mm_per_rev: Option<f64>,
+    /// Risk of every limit here in place of that of all zones, where each limit has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 0.1, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_i")), ("x-advanced" = json!(true))))]
+    pub risk_percent: Option<f64>,
 }
 
 impl Zone {

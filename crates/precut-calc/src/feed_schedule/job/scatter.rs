@@ -229,13 +229,17 @@ pub(in crate::feed_schedule) fn warnings(job: &Job, case: &Case, outcome: &Outco
     let part = of_part(job, case, outcome);
     let mut found = Vec::new();
     for OutputLimit { name, .. } in &OUTPUT_LIMITS {
-        let least = job.risk.of_part().map_or(LEAST_SHARE, |risk| risk * (1.0 + SOLVED));
-        found.extend(told("limit", least, part.iter().filter(|kept| kept.name == *name)));
+        let least = |kept: &Kept| {
+            let place = case.zones.iter().find(|zone| zone.id == kept.zone).map(|zone| zone.index);
+            let asked = place.and_then(|place| job.risk_in_zone(place)).or(job.risk.of_part());
+            asked.map_or(LEAST_SHARE, |risk| risk * (1.0 + SOLVED))
+        };
+        found.extend(told("limit", &least, part.iter().filter(|kept| kept.name == *name)));
     }
     let (lives, edges) = of_edges(job, case, outcome);
     let least = job.risk.of_edges().map_or(LEAST_SHARE, |risk| risk * (1.0 + SOLVED));
-    found.extend(told("limit", least, lives.iter()));
-    found.extend(told("edge", least, edges.iter()));
+    found.extend(told("limit", &|_| least, lives.iter()));
+    found.extend(told("edge", &|_| least, edges.iter()));
     found
 }
 
@@ -258,8 +262,9 @@ pub(in crate::feed_schedule) fn without(job: &Job, case: &Case) -> Vec<Finding> 
     found
 }
 
-fn told<'k>(of: &'static str, least: f64, places: impl Iterator<Item = &'k Kept>) -> Option<Finding> {
-    let worst = places.max_by(|a, b| a.passed.total_cmp(&b.passed)).filter(|worst| worst.passed > least)?;
+fn told<'k>(of: &'static str, least: &dyn Fn(&Kept) -> f64, places: impl Iterator<Item = &'k Kept>) -> Option<Finding> {
+    let passed = places.filter(|kept| kept.passed > least(kept));
+    let worst = passed.max_by(|a, b| a.passed.total_cmp(&b.passed))?;
     let unit = if of == "edge" { "1" } else { worst.output.unit() };
     Some(
         Finding::new("half_fail", format!("/models/{}/residual_scatter", worst.output.name()))

@@ -255,7 +255,7 @@ impl Rates {
             Goal::Cost { machine_rate_per_min, tool_change_time_min, edge_cost, fixed_time_min, fixed_cost } => {
                 Some(Self {
                     per_minute: machine_rate_per_min,
-                    per_edge: machine_rate_per_min * tool_change_time_min + edge_cost,
+                    per_edge: machine_rate_per_min * tool_change_time_min + edge_cost + case.edge_failures_cost,
                     fixed: machine_rate_per_min * (fixed_time_min + case.passes_time_min) + fixed_cost,
                 })
             }

@@ -56,6 +56,11 @@ pub enum Risk {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
         edge_risk_percent: Option<f64>,
+        /// What an edge that is worn out before it is changed costs beside itself, in the money of the objective: it is paid with the
+        /// probability of that.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 80.0, extensions(("x-unit" = json!("money")), ("x-symbol" = json!("k_f"))))]
+        edge_failure_cost: Option<f64>,
     },
     /// At least one limit of a part may be passed with this probability: it is shared out as costs least.
     Joint {
@@ -66,6 +71,11 @@ pub enum Risk {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
         edge_risk_percent: Option<f64>,
+        /// What an edge that is worn out before it is changed costs beside itself, in the money of the objective: it is paid with the
+        /// probability of that.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 80.0, extensions(("x-unit" = json!("money")), ("x-symbol" = json!("k_f"))))]
+        edge_failure_cost: Option<f64>,
     },
     /// The joint risk at which the objective and the parts that are lost cost least together.
     LeastCost {
@@ -76,6 +86,11 @@ pub enum Risk {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schema(exclusive_minimum = 0.0, exclusive_maximum = 50.0, example = 2.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("alpha_e"))))]
         edge_risk_percent: Option<f64>,
+        /// What an edge that is worn out before it is changed costs beside itself, in the money of the objective: it is paid with the
+        /// probability of that.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(exclusive_minimum = 0.0, maximum = 1e9, example = 80.0, extensions(("x-unit" = json!("money")), ("x-symbol" = json!("k_f"))))]
+        edge_failure_cost: Option<f64>,
     },
 }
 
@@ -114,6 +129,20 @@ impl Risk {
         }
     }
 
+    /// What edges that are worn out before they are changed cost on average, money per edge.
+    pub(in crate::feed_schedule) fn cost_per_edge(self) -> f64 {
+        self.edge_failure_cost().zip(self.of_edges()).map_or(0.0, |(cost, risk)| cost * risk)
+    }
+
+    fn edge_failure_cost(self) -> Option<f64> {
+        match self {
+            Self::None {} => None,
+            Self::Each { edge_failure_cost, .. }
+            | Self::Joint { edge_failure_cost, .. }
+            | Self::LeastCost { edge_failure_cost, .. } => edge_failure_cost,
+        }
+    }
+
     fn with_part(self, risk: f64) -> Self {
         let mut changed = self;
         if let Self::Each { risk_percent, .. } | Self::Joint { risk_percent, .. } = &mut changed {
@@ -135,6 +164,41 @@ pub(in crate::feed_schedule) fn check(job: &Job, violations: &mut Violations) {
     violations.require(is_money || !matches!(job.risk, Risk::LeastCost { .. }), || {
         Finding::new("scrap_without_cost", "/objective/kind").with("objective", job.objective.name())
     });
+    if job.risk.edge_failure_cost().is_some() {
+        violations.require(is_money, || {
+            Finding::new("edge_failure_without_cost", "/objective/kind").with("objective", job.objective.name())
+        });
+        violations.require(job.risk.of_edges().is_some(), || {
+            Finding::new("edge_failure_without_risk", "/risk/edge_failure_cost")
+        });
+    }
+    for (i, _) in job.zones.iter().enumerate().filter(|(_, zone)| zone.risk_percent.is_some()) {
+        violations.require(matches!(job.risk, Risk::Each { .. }), || {
+            Finding::new("zone_risk_without_each", format!("/zones/{i}/risk_percent"))
+        });
+    }
+}
+
+impl Job {
+    /// The risk of every limit of a zone, as a share: its own, else that of all.
+    pub(in crate::feed_schedule) fn risk_in_zone(&self, zone: usize) -> Option<f64> {
+        let own = self.zones.get(zone).and_then(|zone| zone.risk_percent).map(|percent| percent / 100.0);
+        self.risk.of_part().map(|risk| own.unwrap_or(risk))
+    }
+
+    /// The least of them.
+    fn least_risk(&self) -> Option<f64> {
+        (0..self.zones.len()).filter_map(|zone| self.risk_in_zone(zone)).chain(self.risk.of_part()).reduce(f64::min)
+    }
+
+    /// The same with no limit at less than a risk.
+    fn at_risk(&self, risk: f64) -> Self {
+        let mut raised = Self { risk: self.risk.with_part(risk), ..self.clone() };
+        for own in raised.zones.iter_mut().filter_map(|zone| zone.risk_percent.as_mut()) {
+            *own = own.max(100.0 * risk);
+        }
+        raised
+    }
 }
 
 /// The job with the risk that costs least in place of the wish for it: there the objective falls by as much as the parts cost
@@ -144,9 +208,11 @@ pub(in crate::feed_schedule) fn acting<'j>(
     held: Option<&Held>,
     monitor: &dyn Monitor,
 ) -> Result<Cow<'j, Job>, Unsolved> {
-    let Risk::LeastCost { scrap_cost, edge_risk_percent } = job.risk else { return Ok(Cow::Borrowed(job)) };
+    let Risk::LeastCost { scrap_cost, edge_risk_percent, edge_failure_cost } = job.risk else {
+        return Ok(Cow::Borrowed(job));
+    };
     let at = |alpha: f64| {
-        let risk = Risk::Joint { risk_percent: 100.0 * alpha, edge_risk_percent };
+        let risk = Risk::Joint { risk_percent: 100.0 * alpha, edge_risk_percent, edge_failure_cost };
         Job { risk, ..job.clone() }
     };
     // How much more the objective falls with a risk than the lost parts cost.
@@ -215,11 +281,11 @@ pub(in crate::feed_schedule) fn move_in(case: &mut Case, job: &Job) {
     }
     let Some(risk) = job.risk.of_part() else { return };
     let all = scattered(case, job);
-    let own = match job.risk {
-        Risk::Joint { .. } => -((-risk).ln_1p() / all.len().max(1) as f64).exp_m1(),
-        _ => risk,
-    };
     for one in &all {
+        let own = match job.risk {
+            Risk::Joint { .. } => -((-risk).ln_1p() / all.len().max(1) as f64).exp_m1(),
+            _ => job.risk_in_zone(case.zones[one.zone].index).unwrap_or(risk),
+        };
         case.zones[one.zone].margins[one.limit] = Margin::new(one.scatter.deviations(own), one.scatter);
     }
 }
@@ -258,11 +324,14 @@ pub(in crate::feed_schedule) fn solved(
     }
     match solve(&case, true, monitor) {
         Ok(solved) => {
-            // d ln f/d ln alpha over all limits: each moves by s alpha/phi(q).
+            // d ln f/d ln alpha over all limits that have no risk of their own: each moves by s alpha/phi(q).
+            let has_own = |one: &&Scattered| {
+                job.zones.get(case.zones[one.zone].index).is_some_and(|zone| zone.risk_percent.is_some())
+            };
             let slope = |one: &Scattered| {
                 one.deviation(&solved.at).0 * risk / one.scatter.density(one.scatter.deviations(risk))
             };
-            let worth = all.iter().map(|one| multiplier(&solved, one) * slope(one)).sum();
+            let worth = all.iter().filter(|one| !has_own(one)).map(|one| multiplier(&solved, one) * slope(one)).sum();
             Ok((case, solved, Some(worth)))
         }
         Err(Unsolved::Infeasible(found)) => {
@@ -295,7 +364,7 @@ fn hazard(t: f64) -> f64 {
 }
 
 fn at_this_risk(job: &Job, least: f64) -> Unsolved {
-    let asked = job.risk.of_part().unwrap_or(0.0);
+    let asked = job.least_risk().unwrap_or(0.0);
     let finding = Finding::new("infeasible_at_this_risk", "/risk")
         .measured(100.0 * asked, 100.0 * least, "percent")
         .with("least_risk_percent", 100.0 * least);
@@ -305,14 +374,14 @@ fn at_this_risk(job: &Job, least: f64) -> Unsolved {
 /// The least risk of each limit at which there is a schedule; `None` where none is found below a half.
 fn least_of_each(job: &Job, held: Option<&Held>, monitor: &dyn Monitor) -> Result<Option<f64>, Failure> {
     let is_possible = |risk: f64| -> Result<bool, Failure> {
-        let case = Case::of(&Job { risk: job.risk.with_part(risk), ..job.clone() }, held, None)?;
+        let case = Case::of(&job.at_risk(risk), held, None)?;
         match solve(&case, false, monitor) {
             Ok(_) => Ok(true),
             Err(Unsolved::Failed(Failure::Cancelled)) => Err(Failure::Cancelled),
             Err(_) => Ok(false),
         }
     };
-    let (mut no, mut yes) = (deviations(job.risk.of_part().unwrap_or(MOST)), deviations(0.999 * MOST));
+    let (mut no, mut yes) = (deviations(job.least_risk().unwrap_or(MOST)), deviations(0.999 * MOST));
     if !is_possible(normal_below(-yes))? {
         return Ok(None);
     }

@@ -79,7 +79,7 @@ impl<'a> Judged<'a> {
     ) -> Result<Option<Self>, Failure> {
         let uncertainties = uncertainties(job)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
-        if uncertainties.of.is_empty() {
+        if uncertainties.count() == 0 {
             return Ok(None);
         }
         let clamped = case.holding.clamp_force_n.is_some_and(|force| force > 0.0);
@@ -128,7 +128,7 @@ impl<'a> Judged<'a> {
     }
 
     fn tried(&self, factors: &[f64], working: Working) -> Result<Margins<LIMITS>, Failure> {
-        self.margins(&drawn(self.case, &self.uncertainties, factors), working)
+        self.margins(&drawn(self.job, self.case, &self.uncertainties, factors)?, working)
     }
 
     /// The block of the answer. `deepest_mm` where a depth is looked for, too, and how deep.

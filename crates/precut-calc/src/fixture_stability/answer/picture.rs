@@ -26,6 +26,7 @@ pub(in crate::fixture_stability) const DOUBT_LABELS: &[&str] = &[
     "doubt_cutting_force",
     "doubt_clamp_force",
     "doubt_friction",
+    crate::certainty::picture::MODEL_LABEL,
 ];
 
 /// Codes that the figures utter.

@@ -16,7 +16,8 @@ use crate::fixture_stability::answer::parts::plane_of;
 use crate::fixture_stability::answer::speeds::said;
 use crate::fixture_stability::answer::study::{Study, WITHIN, removal_rate};
 use crate::fixture_stability::job::acting::Case;
-use crate::fixture_stability::job::uncertain::{Drawn, FixtureQuantity, drawn};
+use crate::fixture_stability::job::input::FixtureJob;
+use crate::fixture_stability::job::uncertain::{Drawn, FixtureQuantity, drawn, scales_alone};
 use crate::fixture_stability::model::floquet::Working;
 use crate::fixture_stability::model::holding::Holding;
 use crate::fixture_stability::model::lobes::{BoundaryPoint, Plane, boundary};
@@ -160,11 +161,11 @@ pub(in crate::fixture_stability) fn probable_depths(
     judged: &Judged<'_>,
 ) -> Result<Option<ProbableDepths>, Failure> {
     let case = &study.case;
-    if !scales(case) {
+    if !scales(case) || !scales_alone(study.job) {
         return Ok(None);
     }
     let plane = plane_of(study.job, case, study.examined_mm);
-    let scalings = scalings(case, judged.uncertainties(), study.job.uncertainty.seed);
+    let scalings = scalings(study.job, case, judged.uncertainties())?;
     let net = net(study, &plane, &scalings)?;
     let last = plane.speeds.saturating_sub(1).max(1) as f64;
     let speeds: Vec<f64> = (0..plane.speeds).map(|index| plane.speed_rpm(index as f64 / last)).collect();
@@ -190,9 +191,16 @@ pub(in crate::fixture_stability) fn probable_depths(
     }))
 }
 
-fn scalings(case: &Case, uncertainties: &Uncertainties<FixtureQuantity>, seed: u32) -> Vec<Scaling> {
-    let of = |point: Vec<f64>| Scaling::of(case, &drawn(case, uncertainties, &uncertainties.values(&point)));
-    points(DRAWS, uncertainties.of.len(), seed).map(of).collect()
+fn scalings(
+    job: &FixtureJob,
+    case: &Case,
+    uncertainties: &Uncertainties<FixtureQuantity>,
+) -> Result<Vec<Scaling>, Failure> {
+    let of = |point: Vec<f64>| {
+        let there = drawn(job, case, uncertainties, &uncertainties.values(&point))?;
+        Ok(Scaling::of(case, &there))
+    };
+    points(DRAWS, uncertainties.dimensions(), job.uncertainty.seed).map(of).collect()
 }
 
 fn net(study: &Study<'_>, plane: &Plane, scalings: &[Scaling]) -> Result<Net, Failure> {

@@ -3,10 +3,12 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::calculator::Violations;
+use crate::calculator::{Failure, Violations};
 use crate::certainty::{
-    Block, Contradiction, Distribution, Level, Quantity, Uncertainties, WidthUnit, uncertainty_block,
+    Block, Contradiction, Distribution, Level, OpenEffects, Quantity, Uncertainties, WidthUnit, check_brought, open,
+    uncertainty_block,
 };
+use crate::effects::{FixtureEffect, JointUncertainty};
 
 use crate::fixture_stability::job::acting::Case;
 use crate::fixture_stability::job::input::{FixtureJob, Vise};
@@ -86,6 +88,22 @@ impl FixtureQuantity {
         }
     }
 
+    /// The effect that is the same quantity, as a diagnosis finds it; `None` where there is none.
+    fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::JointStiffness => Some("stiffness"),
+            Self::Damping => Some("damping"),
+            Self::WorkpieceMass => Some("mass"),
+            Self::CuttingForce => Some("force_coefficient"),
+            Self::MovableJointStiffness | Self::FixedJointStiffness | Self::ClampForce | Self::Friction => None,
+        }
+    }
+
+    /// Whether what is not known of the effects of the job tells of it.
+    fn is_brought(self, job: &FixtureJob) -> bool {
+        self.effect().is_some_and(|kind| open::tells_of(&job.effects, &job.uncertainty.effects, kind))
+    }
+
     /// Whether it is a part of what `joint_stiffness` stands for.
     fn is_of_joints(self) -> bool {
         matches!(self, Self::MovableJointStiffness | Self::FixedJointStiffness)
@@ -105,6 +123,7 @@ uncertainty_block! {
     FixtureUncertainty {
         quantities: FixtureUncertainQuantity of FixtureQuantity (max_items = 8, extensions(("x-advanced" = json!(true)))), such as "damping";
         correlations: FixtureCorrelation (28), such as ["joint_stiffness", "damping"];
+        effects: Vec<JointUncertainty>;
         /// Whether what is usual is uncertain, too, where nothing is said of it: stiffness and damping of the joints, cutting force,
         /// clamp force, friction.
         defaults;
@@ -122,7 +141,7 @@ pub(in crate::fixture_stability) fn uncertainties(
     let usual = usual(job);
     let is_left = |quantity: &FixtureQuantity| {
         let has_parts = *quantity == FixtureQuantity::JointStiffness && stated.iter().any(|one| one.is_of_joints());
-        !has_parts && !stated.contains(quantity)
+        !has_parts && !stated.contains(quantity) && !quantity.is_brought(job)
     };
     let of_usual = |quantity: FixtureQuantity| {
         let own = usual.iter().find(|(usual, _)| *usual == quantity);
@@ -130,7 +149,8 @@ pub(in crate::fixture_stability) fn uncertainties(
     };
     let left = usual.iter().map(|(quantity, _)| *quantity).filter(is_left);
     let of = |quantity| block.uncertain(quantity, Level::Setup, of_usual(quantity));
-    Uncertainties::new(stated.iter().copied().chain(left).filter_map(of).collect(), block.pairs())
+    let of = stated.iter().copied().chain(left).filter_map(of).collect();
+    Ok(Uncertainties::new(of, block.pairs())?.beside(OpenEffects::of(&job.effects, &block.effects)))
 }
 
 /// What is uncertain in every job that has it: quantities and the standard deviation of their logarithm.
@@ -145,17 +165,43 @@ fn usual(job: &FixtureJob) -> Vec<(FixtureQuantity, f64)> {
     all
 }
 
-/// The vise where the quantities come to this.
-pub(in crate::fixture_stability) fn drawn(case: &Case, of: &Uncertainties<FixtureQuantity>, factors: &[f64]) -> Drawn {
+/// Effects of which anything may be unknown while two numbers tell the limit: factors on stiffness, mass, damping and force, and what
+/// acts on the clamp force alone.
+const SCALING: [&str; 5] = ["stiffness", "damping", "mass", "force_coefficient", "preload_loss"];
+
+/// Whether what is not known of the effects of a job is of those alone.
+pub(in crate::fixture_stability) fn scales_alone(job: &FixtureJob) -> bool {
+    let is_open = |kind: &str| open::tells_of(&job.effects, &job.uncertainty.effects, kind);
+    job.effects.iter().map(FixtureEffect::kind).all(|kind| SCALING.contains(&kind) || !is_open(kind))
+}
+
+/// The vise where the quantities come to these values.
+pub(in crate::fixture_stability) fn drawn(
+    job: &FixtureJob,
+    case: &Case,
+    of: &Uncertainties<FixtureQuantity>,
+    values: &[f64],
+) -> Result<Drawn, Failure> {
+    let case = match of.effects.effects(&job.effects, of.of_effects(values))? {
+        Some(effects) => {
+            let moved = Case::with(job, &effects, &job.conditions);
+            let moved = moved.ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
+            Case { working: case.working, ..moved }
+        }
+        None => case.clone(),
+    };
     let friction = case.grip.as_ref().map_or(1.0, |grip| grip.friction.value);
-    let mut draw = Drawn { case: case.clone(), friction };
-    for (one, factor) in of.of.iter().zip(factors) {
+    let mut draw = Drawn { case, friction };
+    for (one, factor) in of.of.iter().zip(values) {
         one.quantity.put(*factor, &mut draw);
     }
-    draw
+    Ok(draw)
 }
 
 /// Finds what cannot be.
 pub(in crate::fixture_stability) fn check(job: &FixtureJob, violations: &mut Violations) {
-    job.uncertainty.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
+    let block = &job.uncertainty;
+    block.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
+    open::check(&job.effects, &block.effects, violations);
+    check_brought(block.quantities.iter().map(|one| one.quantity), |one| one.is_brought(job), violations);
 }

@@ -8,7 +8,7 @@ use crate::calculator::{
     Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
     checkpoint,
 };
-use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect};
+use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect, JointUncertainty};
 
 use crate::fixture_stability::FixtureStability;
 use crate::fixture_stability::job::acting::Case;
@@ -145,6 +145,7 @@ impl ForwardModel for FixtureStability {
     type Prepared = PreparedFixture;
 
     const CAUSES: &'static [Cause] = FIXTURE_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["spindle_speed_rpm", "feed_mm_per_tooth", "depth_mm"];
 
@@ -152,8 +153,14 @@ impl ForwardModel for FixtureStability {
         &job.effects
     }
 
+    fn open_effects(job: &FixtureJob) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &FixtureJob) -> FixtureJob {
-        FixtureJob { effects: Vec::new(), ..job.clone() }
+        let mut job = FixtureJob { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(

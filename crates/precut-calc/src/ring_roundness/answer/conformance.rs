@@ -1,5 +1,6 @@
 //! How probable it is that the ring comes out within its tolerance (`certainty/7.1`).
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
@@ -11,6 +12,7 @@ use crate::certainty::{
     Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties, WidthUnit, bounded,
     improbable, normal_below, probably,
 };
+use crate::effects::RingEffect;
 
 use crate::ring_roundness::job::input::Job;
 use crate::ring_roundness::job::uncertain::{PHASES, RingQuantity, drawn, uncertainties};
@@ -108,7 +110,7 @@ pub(in crate::ring_roundness) fn conformance(
     let judged = Judged { job, scene, end, blank_mm, limit_um, of, share, cut: AtomicUsize::new(0) };
     let surface = judged.surface()?;
     let near = |of: &Uncertainties<RingQuantity>, g: &[f64]| surface.at(&judged.coordinates(of, g))[0];
-    let count = judged.of.of.len();
+    let count = judged.of.dimensions();
     let slopes: Vec<f64> = (0..count)
         .map(|index| {
             let at = |score: f64| {
@@ -133,7 +135,10 @@ pub(in crate::ring_roundness) fn conformance(
     let below = |um: f64| Ok(sampled.kept((limit_um / um).ln(), &own, &nearly)?.probability);
     let off = sampled.variance_off(&own);
     let now = nearly(0.0)?;
-    let halved = |index: usize| Ok(bounded(found.probability + by_surface(&judged.of.halved(index), 0.0)? - now));
+    let halved = |places: &[usize]| {
+        let halved = places.iter().fold(judged.of.clone(), |of, &place| of.halved(place));
+        Ok(bounded(found.probability + by_surface(&halved, 0.0)? - now))
+    };
     let contributions = judged.contributions(&slopes, off, halved)?;
     let is_common = |one: &&Contribution| one.level == Level::Setup;
     let length = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
@@ -152,15 +157,25 @@ pub(in crate::ring_roundness) fn conformance(
     })
 }
 
+/// Where a ring is turned, and of what.
+struct Stage<'a> {
+    scene: Cow<'a, Scene>,
+    end: Cow<'a, Stance>,
+    blank_mm: Cow<'a, [f64]>,
+}
+
 impl Judged<'_> {
     /// The response surface of the margin over the quantities, phases as the job states them.
     fn surface(&self) -> Result<Surface, Failure> {
-        let count = self.of.of.len();
+        let count = self.of.count();
         let mut cut = 0.0;
         let all = (1 + 2 * count + count * count.saturating_sub(1) / 2) as f64;
         Surface::of(&vec![true; count], &mut |x| {
-            let values: Vec<f64> =
-                self.of.of.iter().zip(x).map(|(one, x)| value_at(one.quantity, &one.distribution, *x)).collect();
+            // What is not known of effects comes in standard deviations.
+            let value = |(place, x): (usize, &f64)| {
+                self.of.of.get(place).map_or(*x, |one| value_at(one.quantity, &one.distribution, *x))
+            };
+            let values: Vec<f64> = x.iter().enumerate().map(value).collect();
             // At phases as the job states them.
             let margin = self.margin(&values, [f64::NEG_INFINITY; PHASES])?;
             cut += 1.0;
@@ -171,11 +186,11 @@ impl Judged<'_> {
 
     /// Coordinates of the surface at independent scores.
     fn coordinates(&self, of: &Uncertainties<RingQuantity>, g: &[f64]) -> Vec<f64> {
-        let values = of.values(&g[..self.of.of.len()]);
-        let one = |(one, value): (&crate::certainty::Uncertain<RingQuantity>, f64)| {
-            coordinate(one.quantity, &one.distribution, value)
+        let values = of.values(&g[..self.of.dimensions()]);
+        let one = |(place, value): (usize, f64)| {
+            self.of.of.get(place).map_or(value, |one| coordinate(one.quantity, &one.distribution, value))
         };
-        self.of.of.iter().zip(values).map(one).collect()
+        values.into_iter().enumerate().map(one).collect()
     }
 
     /// Margins at many points of independent scores.
@@ -183,7 +198,7 @@ impl Judged<'_> {
         let mut all = Vec::with_capacity(points.len());
         for some in points.chunks(AT_ONCE) {
             checkpoint(self.share.monitor)?;
-            let count = self.of.of.len();
+            let count = self.of.dimensions();
             all.extend(side_by_side(some, |g| {
                 let values = self.of.values(&g[..count]);
                 self.margin(&values, std::array::from_fn(|phase| g[count + phase]))
@@ -200,9 +215,11 @@ impl Judged<'_> {
 
     /// By how much the limit is kept, as a logarithm; of a ring that does not rest or is not touched it is not.
     fn margin(&self, values: &[f64], phases: [f64; PHASES]) -> Result<f64, Failure> {
-        let Some(drawn) = drawn(self.scene, self.end, &self.of, values, phases) else { return Ok(-FAR) };
-        let mean = self.blank_mm.iter().sum::<f64>() / self.blank_mm.len() as f64;
-        let mut blank: Vec<f64> = self.blank_mm.iter().map(|radius| mean + drawn.waves * (radius - mean)).collect();
+        let effects = self.of.effects.effects(&self.job.effects, self.of.of_effects(values))?;
+        let Some(stage) = self.stage(effects.as_deref())? else { return Ok(-FAR) };
+        let Some(drawn) = drawn(&stage.scene, &stage.end, &self.of, values, phases) else { return Ok(-FAR) };
+        let mean = stage.blank_mm.iter().sum::<f64>() / stage.blank_mm.len() as f64;
+        let mut blank: Vec<f64> = stage.blank_mm.iter().map(|radius| mean + drawn.waves * (radius - mean)).collect();
         let count = blank.len();
         blank.rotate_left(turned_nodes(drawn.turned, count));
         let monitor = self.share.monitor;
@@ -210,6 +227,19 @@ impl Judged<'_> {
         let Some(turned) = turned.filter(|turned| turned.first_contact_rev.is_some()) else { return Ok(-FAR) };
         let found = or_none(roundness_um(&turned.radii_mm, self.job.filter, monitor))?;
         Ok(found.map_or(-FAR, |(um, _)| (self.limit_um / um).ln().clamp(-FAR, FAR)))
+    }
+
+    /// Setting and blank, with effects that are not quite those that are stated; `None` where the ring does not rest so.
+    fn stage(&self, effects: Option<&[RingEffect]>) -> Result<Option<Stage<'_>>, Failure> {
+        let Some(effects) = effects else {
+            let (scene, end) = (Cow::Borrowed(self.scene), Cow::Borrowed(self.end));
+            return Ok(Some(Stage { scene, end, blank_mm: Cow::Borrowed(&self.blank_mm) }));
+        };
+        let scene = Scene::of(self.job, effects);
+        let Some(end) = scene.end() else { return Ok(None) };
+        let blank_mm = or_none(scene.blank_mm(self.job, self.blank_mm.len()).map_err(unevaluable))?;
+        let Some(blank_mm) = blank_mm else { return Ok(None) };
+        Ok(Some(Stage { scene: Cow::Owned(scene), end: Cow::Owned(end), blank_mm: Cow::Owned(blank_mm) }))
     }
 
     /// Roundness deviation that a ring is below with a probability, um.
@@ -228,21 +258,23 @@ impl Judged<'_> {
         &self,
         slopes: &[f64],
         off: f64,
-        halved: impl Fn(usize) -> Result<f64, Failure>,
+        halved: impl Fn(&[usize]) -> Result<f64, Failure>,
     ) -> Result<Vec<Contribution>, Failure> {
         let variance = slopes.iter().map(|s| s * s).sum::<f64>() + off;
         let share = |own: f64| {
             let share = if variance > 0.0 { own / variance } else { 0.0 };
-            self.of.scores.is_independent().then_some(share)
+            self.of.is_independent().then_some(share)
         };
         let mut all = Vec::with_capacity(slopes.len() + 1);
-        for (index, (one, slope)) in self.of.of.iter().zip(slopes).enumerate() {
+        for (one, places) in self.of.named() {
+            // Each has the score of its own place, where they are independent.
+            let own = places.iter().filter_map(|&place| slopes.get(place)).map(|slope| slope * slope).sum();
             all.push(Contribution {
-                quantity: one.quantity.name().to_owned(),
+                quantity: one.name.to_owned(),
                 source: one.source,
                 level: one.level,
-                share_of_variance: share(slope * slope),
-                joint_probability_if_halved: Some(halved(index)?),
+                share_of_variance: share(own),
+                joint_probability_if_halved: Some(halved(&places)?),
             });
         }
         all.push(Contribution {

@@ -22,6 +22,7 @@ pub(in crate::ring_roundness) const DOUBT_LABELS: &[&str] = &[
     "doubt_roller_runout",
     "doubt_blank_amplitude",
     "doubt_phases",
+    crate::certainty::picture::MODEL_LABEL,
 ];
 
 /// Codes that the figures utter.

@@ -7,8 +7,10 @@ use utoipa::ToSchema;
 
 use crate::calculator::Violations;
 use crate::certainty::{
-    Block, Contradiction, Distribution, Level, Quantity, Uncertainties, WidthUnit, normal_below, uncertainty_block,
+    Block, Contradiction, Distribution, Level, OpenEffects, Quantity, Uncertainties, WidthUnit, check_brought,
+    normal_below, open, uncertainty_block,
 };
+use crate::effects::JointUncertainty;
 
 use crate::ring_roundness::job::input::Job;
 use crate::ring_roundness::model::scene::Scene;
@@ -69,6 +71,20 @@ impl RingQuantity {
         }
     }
 
+    /// The effect that is the same quantity, as a diagnosis finds it; `None` where there is none.
+    fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::ComplianceRatio => Some("tool_push_off"),
+            Self::RollerRunout => Some("roller_runout"),
+            Self::ToolAngle | Self::SupportHalfAngle | Self::BlankAmplitude => None,
+        }
+    }
+
+    /// Whether what is not known of the effects of the job tells of it.
+    fn is_brought(self, job: &Job) -> bool {
+        self.effect().is_some_and(|kind| open::tells_of(&job.effects, &job.uncertainty.effects, kind))
+    }
+
     fn level(self) -> Level {
         match self {
             Self::RollerRunout | Self::BlankAmplitude => Level::Part,
@@ -94,6 +110,7 @@ uncertainty_block! {
     RingUncertainty {
         quantities: RingUncertainQuantity of RingQuantity (max_items = 5), such as "tool_angle";
         correlations: RingCorrelation (10), such as ["tool_angle", "support_half_angle"];
+        effects: Vec<JointUncertainty>;
         /// Whether what is usual is uncertain, too, where nothing is said of it: both angles, compliance ratio, run-out of the
         /// rollers, the blank.
         defaults;
@@ -106,15 +123,19 @@ uncertainty_block! {
 pub(in crate::ring_roundness) fn uncertainties(job: &Job) -> Result<Uncertainties<RingQuantity>, Contradiction> {
     let block = &job.uncertainty;
     let of = |quantity: RingQuantity| {
-        let usual = quantity.missing_in(job).is_none().then(|| quantity.usual());
-        block.uncertain(quantity, quantity.level(), usual)
+        let is_usual = quantity.missing_in(job).is_none() && !quantity.is_brought(job);
+        block.uncertain(quantity, quantity.level(), is_usual.then(|| quantity.usual()))
     };
-    Uncertainties::new(RingQuantity::ALL.into_iter().filter_map(of).collect(), block.pairs())
+    let of = RingQuantity::ALL.into_iter().filter_map(of).collect();
+    Ok(Uncertainties::new(of, block.pairs())?.beside(OpenEffects::of(&job.effects, &block.effects)))
 }
 
 /// Finds what cannot be.
 pub(in crate::ring_roundness) fn check(job: &Job, violations: &mut Violations) {
-    job.uncertainty.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
+    let block = &job.uncertainty;
+    block.check(|| uncertainties(job).err(), |quantity| quantity.missing_in(job), violations);
+    open::check(&job.effects, &block.effects, violations);
+    check_brought(block.quantities.iter().map(|one| one.quantity), |one| one.is_brought(job), violations);
 }
 
 /// Scores beside those of the quantities: where the blank and where the rollers stand when the ring begins to turn, of which

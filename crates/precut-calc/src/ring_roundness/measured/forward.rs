@@ -11,7 +11,7 @@ use crate::calculator::{
     JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Violations,
     checkpoint,
 };
-use crate::effects::{Cause, RING_CAUSES, RingEffect};
+use crate::effects::{Cause, JointUncertainty, RING_CAUSES, RingEffect};
 
 use crate::ring_roundness::RingRoundness;
 use crate::ring_roundness::job::input::{Job, Method};
@@ -157,6 +157,7 @@ impl ForwardModel for RingRoundness {
     type Prepared = PreparedRing;
 
     const CAUSES: &'static [Cause] = RING_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["spark_out_revolutions"];
 
@@ -164,8 +165,14 @@ impl ForwardModel for RingRoundness {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        let mut job = Job { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(
