@@ -33,11 +33,13 @@ pub use job::input::{
     ProgramSettings, ProgramZero, SafePosition, Section, Segment, Shaft, SpeedDiameter, Stations, StockRow, Support,
     Theory,
 };
-pub use measured::forward::{DeflectionAllowances, DeflectionPoint, DeflectionRun, PreparedDeflection};
-pub(crate) use measured::forward::{GAUGE_STEP_MM, Measure, QUANTITIES, RELATIVE_STEP, columns_of_runs, difference};
+pub(crate) use measured::about::{GAUGE_STEP_MM, RELATIVE_STEP, columns_of_runs, difference};
+pub(crate) use measured::measure::{Measure, QUANTITIES};
 pub use measured::measurement::DeflectionMeasurement;
 pub(crate) use measured::measurement::{first, measured_diameters};
 pub(crate) use measured::next_runs::longest_run;
+pub use measured::prepared::PreparedDeflection;
+pub use measured::run::{DeflectionAllowances, DeflectionPoint, DeflectionRun};
 pub(crate) use model::equilibrium::{Opening, engage};
 pub use model::form::{Deviation, Extremum, ExtremumKind, Form, FormClass};
 pub(crate) use model::held::{Gaps, Held, Holding, Planned, Push, Slice, ToolPlace};

@@ -10,7 +10,7 @@ use crate::deflection_compensation::answer::output::Path;
 use crate::deflection_compensation::job::acting::Acting;
 use crate::deflection_compensation::job::grid::Grid;
 use crate::deflection_compensation::job::input::{Detail, IncludeMode, Job};
-use crate::deflection_compensation::measured::forward::{CommandedPoint, DeflectionPoint, DeflectionRun};
+use crate::deflection_compensation::measured::run::{CommandedPoint, DeflectionPoint, DeflectionRun};
 use crate::deflection_compensation::{DeflectionCompensation, cuts_at_aim};
 
 /// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between

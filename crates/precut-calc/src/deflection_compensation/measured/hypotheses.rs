@@ -6,7 +6,7 @@ use crate::calculator::{
 use crate::deflection_compensation::job::check::passive_exponent;
 use crate::deflection_compensation::job::formula;
 use crate::deflection_compensation::job::input::{Job, Support};
-use crate::deflection_compensation::measured::forward::DeflectionRun;
+use crate::deflection_compensation::measured::run::DeflectionRun;
 use crate::deflection_compensation::model::regime::Regime;
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect, Fit, Parameter};
 use crate::num::beam::second_moment_mm4;

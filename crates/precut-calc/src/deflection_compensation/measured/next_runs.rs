@@ -2,7 +2,7 @@
 
 use crate::calculator::{NextRun, Ranges, Rows};
 use crate::deflection_compensation::job::input::{FeedDirection, Job};
-use crate::deflection_compensation::measured::forward::{DeflectionPoint, DeflectionRun};
+use crate::deflection_compensation::measured::run::{DeflectionPoint, DeflectionRun};
 
 /// One more run for every condition at either end of its range, the other conditions as in the run
 /// in the middle; depth and feed both at an end, where the force lies farthest off; the other feed direction; a fresh edge; a
