@@ -121,7 +121,8 @@ impl DeflectionQuantity {
             Self::HeadstockCompliance => Some("headstock_compliance"),
             Self::TailstockCompliance => Some("tailstock_compliance"),
             Self::CarriageCompliance => Some("carriage_compliance"),
-            Self::ToolSetting => Some("size_offset"),
+            // What an offset was says nothing of how the tool is set the next time.
+            Self::ToolSetting => None,
             Self::Stiffness | Self::RestCompliance | Self::RestGap | Self::StockDiameter | Self::SpindleScatter => None,
         }
     }
