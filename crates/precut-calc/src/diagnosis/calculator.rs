@@ -46,7 +46,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
     const META: Meta = Meta {
         id: "diagnosis",
         kind: CalculatorKind::Calculator,
-        version: 21,
+        version: 22,
         title: "Diagnosis",
         question: "What does the simulation get wrong, why, and what is gained by mending it?",
         summary: "Measurements of what was really cut against a calculator's job: whether anything is wrong beyond \
@@ -77,7 +77,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let folds = if job.options.held_out { M::folds(rows.len(), runs.len()) } else { 0 };
         let (statistics, bytes) = statistics(rows.len(), runs.len().max(1), 1 + folds);
         let share = if job.options.held_out { WITH_FOLDS } else { WITHOUT_FOLDS };
-        let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * M::PREDICTIONS * share;
+        let predictions = M::predict_all_ms(&job.job, job.runs.len(), rows.len()) * M::PREDICTIONS * share;
         let driver = if predictions > statistics { "/job" } else { "/measurements" };
         Cost { ms: statistics + predictions, bytes, driver }
     }
