@@ -8,6 +8,7 @@ mod deflection;
 mod expression;
 mod fixture;
 mod machinability;
+mod milling;
 mod ring;
 
 pub use deflection::{CAUSES as DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, ErrorPoint};
@@ -17,6 +18,7 @@ pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{
     CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,
 };
+pub use milling::{CAUSES as MILLING_CAUSES, MillingEffect};
 pub(crate) use ring::whole;
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};
 
