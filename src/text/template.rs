@@ -194,16 +194,16 @@ fn labelled(state: &State<'_, '_>, words: Value, labels: Value) -> Result<String
     Ok(said.join(if has_sets { "; " } else { ", " }))
 }
 
-/// A word and in brackets which of several it is: `order 5`, `300 mm`, or a name that the user gave.
+/// A word and in brackets which of several it is: `order 5`, `mode 2`, `300 mm`, or a name that the user gave.
 fn with_label(state: &State<'_, '_>, word: &str, label: &str) -> Result<String, Error> {
     let language = language_of(state);
     let word = Glossary::of(language).word(word);
     let number = |text: &str| text.parse::<f64>().ok().map(|number| number::spoken(&number::read(number), language));
     let label = match label.split_once(' ') {
         None if label.is_empty() => return Ok(word),
-        Some(("order", order)) if number(order).is_some() => {
-            let name = super::name(language, "cause", "cause_of_order");
-            state.env().get_template(&name)?.render(BTreeMap::from([("order", number(order))]))?
+        Some((of @ ("order" | "mode"), which)) if number(which).is_some() => {
+            let name = super::name(language, "cause", &format!("cause_of_{of}"));
+            state.env().get_template(&name)?.render(BTreeMap::from([(of, number(which))]))?
         }
         Some((place, "mm")) => number(place).map_or_else(|| label.to_owned(), |place| amount(&place, "mm", language)),
         _ => label.to_owned(),

@@ -6,17 +6,18 @@ use std::path::Path;
 
 use precut::registry::Registry;
 use precut_calc::effects::{
-    Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, MACHINABILITY_CAUSES, Parameter, RING_CAUSES,
+    Cause, DEFLECTION_CAUSES, FIXTURE_CAUSES, Fit, MACHINABILITY_CAUSES, MILLING_CAUSES, Parameter, RING_CAUSES,
 };
 
 use super::markdown::{Document, documents};
 use super::root;
 
 /// Catalogues and the page that has their numbers.
-const CATALOGUES: [(&[Cause], &str); 4] = [
+const CATALOGUES: [(&[Cause], &str); 5] = [
     (DEFLECTION_CAUSES, "docs/physics/effects-deflection.md"),
     (FIXTURE_CAUSES, "docs/physics/effects-fixture.md"),
     (MACHINABILITY_CAUSES, "docs/physics/effects-machinability.md"),
+    (MILLING_CAUSES, "docs/physics/effects-milling.md"),
     (RING_CAUSES, "docs/physics/effects-ring.md"),
 ];
 

@@ -43,7 +43,7 @@ pub fn register(registrar: &mut impl Registrar) {
     registrar.calculator::<feed_schedule::fit::MachinabilityFit>();
     registrar.diagnosable::<fixture_stability::FixtureStability>();
     registrar.calculator::<fixture_stability::identification::FixtureIdentification>();
-    registrar.calculator::<milling_stability::MillingStability>();
+    registrar.diagnosable::<milling_stability::MillingStability>();
     registrar.calculator::<compliance_fit::ComplianceFit>();
     registrar.calculator::<receptance_fit::ReceptanceFit>();
     registrar.diagnosable::<program_compensation::ProgramCompensation>();

@@ -93,6 +93,8 @@ mod material_library;
 mod milling_answers;
 mod milling_certainty;
 mod milling_clamping;
+mod milling_log;
+mod milling_log_trials;
 mod milling_receptances;
 mod milling_reference;
 mod path_chords;

@@ -1,7 +1,7 @@
 //! Blind trials: jobs and measurements in which an effect is hidden, for testing a diagnosis.
 //!
 //! Nothing here is shared with the calculators: another discretisation (a shear-flexible finite-element
-//! beam on springs; a ring turned in even steps that know no nodes; a cut in a vise by Runge-Kutta steps; cuts as
+//! beam on springs; a ring turned in even steps that know no nodes; a cut in a vise by Runge-Kutta steps, one of an end mill by even ones; cuts as
 //! products of powers), another solver (bisection, fixed point), another noise law (Student-t with six degrees of freedom,
 //! uneven and correlated), nuisances drawn uniformly inside the allowances, and errors of the machine that
 //! are not fed back into the depth of cut. A test that refits its own generator proves nothing.
@@ -9,6 +9,7 @@
 pub mod deflection;
 pub mod fixture;
 pub mod machinability;
+pub mod milling;
 mod observer;
 mod random;
 pub mod ring;

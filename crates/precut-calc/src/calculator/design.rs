@@ -19,6 +19,16 @@ pub struct Design {
     pub fold: Vec<usize>,
 }
 
+impl Design {
+    /// Numbers from 0 on by which keys are told apart, in their order.
+    pub fn numbered<K: Ord + Copy>(keys: &[K]) -> Vec<usize> {
+        let mut known = keys.to_vec();
+        known.sort_unstable();
+        known.dedup();
+        keys.iter().map(|key| known.partition_point(|other| other < key)).collect()
+    }
+}
+
 /// The coordinate along which a quantity varies smoothly.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Smooth {

@@ -88,6 +88,17 @@ pub trait Diagnosable:
         ranges: Ranges<'_>,
     ) -> Vec<NextRun<Self::Run, Self::Point>>;
 
+    /// The same where it takes so long to find them that somebody may wait for its end no more.
+    #[allow(clippy::type_complexity, reason = "the runs of another method, or why there are none")]
+    fn next_runs_watched(
+        job: &Self::Job,
+        rows: &Rows<Self::Run, Self::Point>,
+        ranges: Ranges<'_>,
+        _monitor: &dyn Monitor,
+    ) -> Result<Vec<NextRun<Self::Run, Self::Point>>, Failure> {
+        Ok(Self::next_runs(job, rows, ranges))
+    }
+
     /// Where a row of a next run would be measured, by the fields of a row; nothing where its run says it all, or where
     /// another point is of the same row.
     fn place(_point: &Self::Point) -> Vec<(&'static str, Option<f64>)> {
@@ -164,6 +175,11 @@ pub trait Diagnosable:
         monitor: &dyn Monitor,
     ) -> Result<Vec<Prediction>, Failure> {
         Self::predict_coarsely(prepared, effects, monitor)
+    }
+
+    /// Expected time of one prediction of all rows, ms.
+    fn predict_all_ms(job: &Self::Job, runs: usize, _rows: usize) -> f64 {
+        Self::predict_ms(job) * runs.max(1) as f64
     }
 
     /// Expected time of one prediction of one run, ms: a diagnosis makes some hundreds. 0 where it is next to nothing
@@ -272,12 +288,24 @@ pub struct LimitCurve {
     /// Feed per tooth at which it holds.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub feed_mm_per_tooth: f64,
+    /// Width of cut at which it holds, where rows may differ in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub width_mm: Option<f64>,
     /// Spindle speeds.
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
     pub spindle_speed_rpm: Vec<f64>,
     /// Depth at which chatter begins; absent where there is none up to twice the largest depth measured.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub depth_mm: Vec<Option<f64>>,
+    /// Lower end of its 95 % interval by what the rows leave open of the causes; empty of the base.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub low_mm: Vec<Option<f64>>,
+    /// Upper end.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub high_mm: Vec<Option<f64>>,
 }
 
 /// What a measured row says.

@@ -1,6 +1,6 @@
 //! Causes as they stand for a job and its measured rows: what a diagnosis fits.
 
-use crate::effects::Cause;
+use crate::effects::{Cause, Fit, Parameter};
 
 /// The catalogue, sorted by whether these rows can speak about a cause at all.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -141,6 +141,13 @@ impl Expansions {
         Self { places: values.into_iter().map(|value| vec![value]).collect(), nearest: usize::MAX, parts: 1 }
     }
 
+    /// So many prior standard deviations of a size to either side, as far as its range goes; none of what is no size.
+    pub fn either_way(variable: &Variable, deviations: &[f64]) -> Self {
+        let Treatment::Amplitude { prior_sd } = variable.treatment else { return Self::default() };
+        let sizes = deviations.iter().flat_map(|share| [share * prior_sd, -share * prior_sd]);
+        Self::along(sizes.filter(|size| (variable.range.lower..=variable.range.upper).contains(size)))
+    }
+
     /// About so many of the places that lie farthest from 0, spread over their order.
     pub fn outermost(&self, count: usize) -> Vec<Vec<f64>> {
         let rim = self.beyond(0.999);
@@ -166,6 +173,26 @@ pub struct Variable {
     pub treatment: Treatment,
     /// Where it may lie.
     pub range: Range,
+}
+
+impl Variable {
+    /// Of a parameter of the catalogue within these bounds. Of a factor the logarithm is fitted: it is 0 where it is absent, and a
+    /// factor of 2 as far as one of 1/2.
+    pub fn of(parameter: &Parameter, range: Range) -> Self {
+        let treatment = match parameter.fit {
+            Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },
+            Fit::Shape { grid } => Treatment::Shape { grid: grid.to_vec(), prior: None },
+            Fit::Fixed { default } => Treatment::Stated { value: default },
+            Fit::OfJob => Treatment::Stated { value: 0.0 },
+        };
+        match parameter.fit {
+            Fit::Factor => {
+                let range = Range { lower: range.lower.ln(), upper: range.upper.ln() };
+                Self { name: "ln_factor", unit: "1", treatment, range }
+            }
+            _ => Self { name: parameter.name, unit: parameter.unit, treatment, range },
+        }
+    }
 }
 
 /// Bounds of a variable.

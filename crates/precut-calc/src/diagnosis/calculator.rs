@@ -78,7 +78,7 @@ impl<M: Diagnosable> Calculator for Diagnosis<M> {
         let folds = if job.options.held_out { M::folds(rows.len(), runs.len()) } else { 0 };
         let (statistics, bytes) = statistics(rows.len(), runs.len().max(1), 1 + folds);
         let share = if job.options.held_out { WITH_FOLDS } else { WITHOUT_FOLDS };
-        let predictions = M::predict_ms(&job.job) * job.runs.len().max(1) as f64 * M::PREDICTIONS * share;
+        let predictions = M::predict_all_ms(&job.job, job.runs.len(), rows.len()) * M::PREDICTIONS * share;
         let driver = if predictions > statistics { "/job" } else { "/measurements" };
         Cost { ms: statistics + predictions, bytes, driver }
     }

@@ -8,6 +8,7 @@ mod deflection;
 mod expression;
 mod fixture;
 mod machinability;
+mod milling;
 mod open;
 mod ring;
 
@@ -18,6 +19,7 @@ pub use fixture::{CAUSES as FIXTURE_CAUSES, FixtureConditions, FixtureEffect};
 pub use machinability::{
     CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,
 };
+pub use milling::{CAUSES as MILLING_CAUSES, MillingEffect};
 pub(crate) use open::{Catalogued, has_parameter};
 pub use open::{JointUncertainty, ParameterMove};
 pub(crate) use ring::whole;

@@ -30,7 +30,10 @@ pub use job::input::{
     SpindlePoint, Vise, ViseJoint,
 };
 pub(crate) use job::usual_scatter;
+pub(crate) use measured::consequence::depth_margin;
 pub use measured::forward::{FixtureAllowances, FixturePoint, FixtureRun, RegimeMargin};
+pub(crate) use measured::hypotheses::{RUNOUTS, SHIFTS};
+pub(crate) use measured::margins::{FLATTEST, steepness};
 pub use measured::measurement::{FixtureMeasurement, ObservedRegime};
 
 pub(crate) use answer::conformance::{WARNING_CODES as IMPROBABLE_CODES, quiet_to};

@@ -52,6 +52,11 @@ fn elements(case: &Case, rotation: &model::Rotation) -> f64 {
     2.0 * case.oscillations_at(rotation).min(MOST_OSCILLATIONS) + periods * (breaks * run_out + turn / 0.8)
 }
 
+/// Of one multiplier to the accuracy of maps, at a speed.
+pub(super) fn on_map_ms(case: &Case, spindle_rpm: f64) -> f64 {
+    case.at_speed(spindle_rpm).map_or(0.0, |rotation| ON_MAP * point_ms(case, &rotation))
+}
+
 /// Of one multiplier.
 fn point_ms(case: &Case, rotation: &model::Rotation) -> f64 {
     if (model::Cut { rotation: *rotation, ..case.cut() }).is_slow() {

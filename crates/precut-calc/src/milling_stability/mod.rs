@@ -2,11 +2,12 @@
 //! cut do to tool, work and surface?
 //!
 //! The way of a job: `job` (fields, rules, numbers in the axes of the cut) -> `model` (chips, edges, the map over a period,
-//! forced motion) -> `answer` (numbers, pictures, what is said).
+//! forced motion) -> `answer` (numbers, pictures, what is said). `measured` is the way of a log of cuts into a diagnosis.
 
 mod answer;
 mod cost;
 mod job;
+mod measured;
 pub mod model;
 
 pub use answer::conformance::MillingConformance;
@@ -25,6 +26,7 @@ pub use job::{
     PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
     YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
+pub use measured::{CutMargin, MillingAllowances, MillingMeasurement, MillingPoint, MillingRun, ObservedCut};
 
 use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
@@ -38,7 +40,7 @@ use crate::receptance_fit::{FAILURE_CODES, FAULT_CODES, WARNING_CODES as FIT_WAR
 
 use answer::{Study, advice, conformance, outcome, picture};
 use cost::cost;
-use job::{Case, fits, too_expensive};
+use job::{Case, beyond_modes, fits, too_expensive};
 
 /// The calculator.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +53,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 5,
+        version: 6,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \
@@ -143,6 +145,9 @@ impl Calculator for MillingStability {
         // From here on the sides that were measured yield by their modes.
         let (fits, job) = fits(job, monitor)?;
         let case = Case::of(&job).ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?;
+        if let Some(finding) = beyond_modes(&job.effects, case.structure.modes.len()) {
+            return Err(Failure::OutOfModel(finding));
+        }
         if let Some(finding) = too_expensive(&job, &case) {
             return Err(Failure::OutOfModel(finding));
         }
@@ -237,8 +242,16 @@ fn basis(job: &Job, study: &Study<'_>) -> Vec<Basis> {
 
 /// Everything that this calculator may utter, from where it is said.
 const CODES: Codes = Codes {
-    faults: &[job::CODES, FAULT_CODES[0], FAULT_CODES[1], DISTRIBUTION_CODES, QUANTITY_CODES, MISSING_CODES],
-    failures: &[FAILURE_CODES],
+    faults: &[
+        job::CODES,
+        &["frequency_of_stable_cut", "width_beside_angles"],
+        FAULT_CODES[0],
+        FAULT_CODES[1],
+        DISTRIBUTION_CODES,
+        QUANTITY_CODES,
+        MISSING_CODES,
+    ],
+    failures: &[FAILURE_CODES, &["effect_without_mode", "strip_misses_cutter"]],
     warnings: &[advice::WARNING_CODES, FIT_WARNING_CODES, IMPROBABLE_CODES],
     explanations: &[advice::EXPLANATION_CODES, conformance::EXPLANATION_CODES, &["probably_quiet_depth"]],
     stages: &[&[

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Diagnosable, Failure, Finding, LimitCurve, Monitor, Prediction};
+use crate::diagnosis::answer::band::band;
 use crate::diagnosis::base::Bound;
 use crate::diagnosis::calculator::Measured;
 use crate::diagnosis::causes::subject::{Belief, Setting};
@@ -26,7 +27,7 @@ const RESAMPLES: usize = 2000;
 pub struct ClassReport {
     /// The class seen.
     pub class: Vec<String>,
-    /// The margin that this entry is about: `chatter` or `opening`.
+    /// The margin that this entry is about: `chatter` or `opening`; `frequency` of the frequency that was heard beside a class.
     pub margin: Vec<String>,
     /// Spindle speed.
     #[schema(extensions(("x-unit" = json!("rev/min"))))]
@@ -34,7 +35,7 @@ pub struct ClassReport {
     /// Depth of cut.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub depth_mm: Vec<f64>,
-    /// Probability that the base gives to the side of the margin that was seen; absent where it has no margin.
+    /// Probability that the base gives to the side of the margin that was seen; absent where it has no margin, and of a frequency.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub probability_base: Vec<Option<f64>>,
     /// The same of the extended model: the base where nothing is named.
@@ -54,6 +55,11 @@ pub struct ClassReport {
     /// The same in the extended model; none where nothing is named.
     #[schema(inline)]
     pub limits_extended: Vec<LimitCurve>,
+    /// The same of the likely sets of causes together, by their probabilities, with its 95 % interval; none where nothing is wrong, or
+    /// nobody knows what is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(inline)]
+    pub limit_band: Vec<LimitCurve>,
 }
 
 /// Classes on data held back.
@@ -62,7 +68,7 @@ pub struct ClassHeldOut {
     /// Parts of the data that were held back one after the other.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub folds: u32,
-    /// Mean logarithm of the probability that the base gives to what was seen.
+    /// Mean logarithm of the probability that the base gives to what was seen; of frequencies of their density, up to its constant.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub log_score_base: f64,
     /// Of the extended model, causes chosen and fitted anew without each part.
@@ -105,12 +111,14 @@ pub(in crate::diagnosis) fn report<M: Diagnosable>(
         extended.map_or_else(|| base.clone(), |with| with.iter().map(|margin| margin.ok()).collect());
     let probability = |margins: &[Option<f64>]| -> Vec<Option<f64>> {
         let of = |row: usize| {
-            margins[row].map(|margin| link::log_probability(sides[row] * margin / weighing.scatter(row)).exp())
+            let margin = margins[row].filter(|_| !link::is_value(sides[row]));
+            margin.map(|margin| link::log_probability(sides[row] * margin / weighing.scatter(row)).exp())
         };
         (0..count).map(of).collect()
     };
     let right = |margins: &[Option<f64>]| {
-        let answered: Vec<bool> = (0..count).filter_map(|row| margins[row].map(|m| m * sides[row] > 0.0)).collect();
+        let classes = (0..count).filter(|&row| !link::is_value(sides[row]));
+        let answered: Vec<bool> = classes.filter_map(|row| margins[row].map(|m| m * sides[row] > 0.0)).collect();
         answered.iter().filter(|right| **right).count() as f64 / answered.len().max(1) as f64
     };
     Ok(Some(ClassReport {
@@ -125,6 +133,7 @@ pub(in crate::diagnosis) fn report<M: Diagnosable>(
         held_out: gain.map(|gain| held_out(weighing, sides, gain, seed)),
         limits_base: places.curves,
         limits_extended,
+        limit_band: band(bound, weighing, monitor)?,
     }))
 }
 
@@ -159,7 +168,8 @@ fn held_out(weighing: &Weighing<'_>, sides: &[f64], gain: &Gain, seed: u64) -> C
         .collect();
     gains.sort_by(f64::total_cmp);
     let right = |of: &dyn Fn(&(f64, f64)) -> f64| {
-        let kept: Vec<usize> = (0..sides.len()).filter(|&row| weighing.keep[row]).collect();
+        let counts = |row: &usize| weighing.keep[*row] && !link::is_value(sides[*row]);
+        let kept: Vec<usize> = (0..sides.len()).filter(counts).collect();
         let hits = kept.iter().filter(|&&row| of(&gain.errors[row]) * sides[row] < 0.0).count();
         hits as f64 / kept.len().max(1) as f64
     };
@@ -177,7 +187,8 @@ fn held_out(weighing: &Weighing<'_>, sides: &[f64], gain: &Gain, seed: u64) -> C
 pub(in crate::diagnosis) fn warnings(weighing: &Weighing<'_>, used: &[usize]) -> Vec<Finding> {
     let foundation = weighing.foundation;
     let Some(sides) = &foundation.data.sides else { return Vec::new() };
-    let kept: Vec<usize> = (0..sides.len()).filter(|&row| weighing.keep[row]).collect();
+    let counts = |row: &usize| weighing.keep[*row] && !link::is_value(sides[*row]);
+    let kept: Vec<usize> = (0..sides.len()).filter(counts).collect();
     let mut found = Vec::new();
     if kept.windows(2).all(|pair| sides[pair[0]] * sides[pair[1]] > 0.0) {
         found.push(Finding::new("one_class", "/measurements").with("count", kept.len()));

@@ -1,5 +1,6 @@
 //! The answer, in the words of the contract.
 
+mod band;
 pub(super) mod blunder;
 pub(super) mod classes;
 pub(super) mod output;

@@ -87,7 +87,7 @@ pub(in crate::diagnosis) fn next_measurement<M: Diagnosable>(
     };
     let separation_now = now.separation(&other);
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
-    let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges));
+    let runs = M::next_runs_watched(&job.job, rows, Ranges(&job.options.ranges), monitor)?;
     let candidates = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
     let Some(best) = cheapest(&candidates).cloned() else { return Ok(None) };
     let further = if best.settles.is_some() { planning.further(&runs, best.number, leader)? } else { Vec::new() };
@@ -248,10 +248,15 @@ fn separation_with<M: Diagnosable>(
         design: M::design(&prepared),
     };
     let mut noise = weighing.noise.clone();
-    if let Some(per_row) = &mut noise.per_row {
-        per_row.resize(all.points.len(), noise.sigma);
+    match M::spreads(&prepared, &job.allowances) {
+        // Of classes what is granted to each row.
+        Some(spreads) => noise.per_row = Some(spreads),
+        None => {
+            if let Some(per_row) = &mut noise.per_row {
+                per_row.resize(all.points.len(), noise.sigma);
+            }
+        }
     }
-    let classes = old.sides.is_some();
     let data = Data { value: vec![0.0; all.points.len()], uncertainty: None, sides: None, layout };
     // Every cause: the sets are found in it by kind.
     let every = DiagnosisOptions::default();
@@ -274,11 +279,14 @@ fn separation_with<M: Diagnosable>(
     // Nor one that the model cannot run.
     let Ok(nuisances) = bound.nuisances() else { return Ok(None) };
     let nuisances: Vec<Sparse> = nuisances.iter().map(|column| Sparse::of(column)).collect();
-    if classes {
+    if let Some(sides) = &old.sides {
+        let mut sides = sides.clone();
+        sides.resize(all.points.len(), 1.0);
         // About the leader, as it is taken to be right.
         let with = bound.predict(&of_leader)?;
         // What has no margin tells nothing.
-        noise = noise.informed(&with.iter().map(|margin| margin.unwrap_or(f64::MAX)).collect::<Vec<_>>());
+        let margins: Vec<f64> = with.iter().map(|margin| margin.unwrap_or(f64::MAX)).collect();
+        noise = noise.informed(&sides, &margins);
     }
     let whitener = Whitener::new(&data, &noise, &nuisances, &keep);
     let a = Signature::anew(&bound, &whitener, &keep, &of_leader)?;

@@ -9,8 +9,8 @@ pub struct Data {
     pub value: Vec<f64>,
     /// Standard uncertainties of the rows, in the same unit, where stated.
     pub uncertainty: Option<Vec<f64>>,
-    /// Of classes: the side of zero, +1 or -1, on which the margin of every row lay. Then `value` is 0, the boundary, and
-    /// `uncertainty` the spread of the margins.
+    /// Of classes: the side of zero, +1 or -1, on which the margin of every row lay; 0 of a row beside them that was measured to stand
+    /// at zero. Then `value` is 0, the boundary, and `uncertainty` the spread of the margins.
     pub sides: Option<Vec<f64>>,
     /// How the rows hang together.
     pub layout: Layout,

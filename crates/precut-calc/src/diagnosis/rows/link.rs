@@ -1,4 +1,6 @@
-//! How probable a class is at a margin: Student's t with five degrees of freedom and unit variance (`diagnosis/3.11`).
+//! How probable a class is at a margin: Student's t with five degrees of freedom and unit variance (`diagnosis/3.11`). A row beside
+//! classes that was measured to stand at zero, as a frequency that was heard, scatters about it as a Gaussian: its side is 0. One in twenty
+//! may be another one than is meant, anywhere: beyond some four standard deviations such a row says no more.
 //!
 //! Cuts scatter with heavy tails, and a class says nothing of how far beyond the boundary its cut went: under a normal
 //! distribution a single cut four standard deviations on the wrong side outweighs thirty others, and names a cause.
@@ -12,13 +14,55 @@ const UNIT: f64 = 1.290_994_448_735_805_6;
 /// Below this t the closed form loses the tail to round-off, and its series in 1/t^2 is exact to 3e-8.
 const FAR: f64 = -60.0;
 
+/// Share of values that are others than is meant, and their density over that of the others at its top: spread over a factor of e, with
+/// a scatter of 1 %.
+const OTHERS: f64 = 0.05;
+const OTHER_DENSITY: f64 = 1e-3;
+
+/// Whether a row is no class, but was measured to stand at zero.
+pub(in crate::diagnosis) fn is_value(side: f64) -> bool {
+    side.abs() < 0.5
+}
+
+/// ln of the probability of what was seen at a margin in standard deviations of its scatter; of a value up to the constant of its
+/// density.
+pub(in crate::diagnosis) fn log_likelihood(side: f64, margin: f64) -> f64 {
+    if is_value(side) { (as_meant(margin) + OTHER_DENSITY).ln() } else { log_probability(side * margin) }
+}
+
+fn as_meant(margin: f64) -> f64 {
+    (-0.5 * margin * margin).exp()
+}
+
+/// Minus twice [`log_likelihood`] of a value that is drawn as values scatter: one normal number, moved, or another value.
+pub(in crate::diagnosis) fn drawn_value(normal: f64, uniform: f64) -> f64 {
+    let drawn = if uniform < OTHERS { f64::MAX.sqrt() } else { normal };
+    -2.0 * log_likelihood(0.0, drawn)
+}
+
+/// Slope of [`log_likelihood`] over the margin, and minus its second derivative; where the tail of a class makes that negative, 0.
+pub(in crate::diagnosis) fn bend(side: f64, margin: f64) -> (f64, f64) {
+    if is_value(side) {
+        let meant = as_meant(margin);
+        let share = meant / (meant + OTHER_DENSITY);
+        return (-margin * share, (share * (1.0 - margin * margin * (1.0 - share))).max(0.0));
+    }
+    let (slope, weight) = derivatives(side * margin);
+    (side * slope, weight)
+}
+
+/// Fisher's information of a row on its margin, in units of its scatter.
+pub(in crate::diagnosis) fn told(side: f64, margin: f64) -> f64 {
+    if is_value(side) { 1.0 } else { information(margin) }
+}
+
 /// ln F(z), z in standard deviations of the scatter, positive on the side of the class.
 pub(in crate::diagnosis) fn log_probability(z: f64) -> f64 {
     cumulative(UNIT * z).ln()
 }
 
 /// d ln F/dz and minus its second derivative; where the tail makes that negative, 0.
-pub(in crate::diagnosis) fn derivatives(z: f64) -> (f64, f64) {
+fn derivatives(z: f64) -> (f64, f64) {
     let t = UNIT * z;
     let ratio = density(t) / cumulative(t);
     let falling = 6.0 * t / (DEGREES + t * t);
@@ -26,7 +70,7 @@ pub(in crate::diagnosis) fn derivatives(z: f64) -> (f64, f64) {
 }
 
 /// Fisher's information of a class on its margin, in units of its scatter: f^2/(F (1 - F)).
-pub(in crate::diagnosis) fn information(z: f64) -> f64 {
+fn information(z: f64) -> f64 {
     let t = UNIT * z;
     (UNIT * density(t)).powi(2) / (cumulative(t) * cumulative(-t))
 }
@@ -83,5 +127,28 @@ mod tests {
         }
         assert!(derivatives(-50.0).1 <= 0.0);
         assert!((information(0.0) - 4.0 * (UNIT * density(0.0)).powi(2)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_value_is_a_gaussian_within_some_deviations_and_a_class_its_side() {
+        for margin in [-5.0, -2.0, 0.0, 0.7, 3.5] {
+            let [low, here, high] = [margin - 1e-4, margin, margin + 1e-4].map(|m| log_likelihood(0.0, m));
+            let (slope, weight) = bend(0.0, margin);
+            // The third derivative of a logarithm whose terms bend by up to a few units, times the square of the step.
+            assert!((slope - (high - low) / 2e-4).abs() < 1e-6, "{margin}");
+            // Round-off of a difference of order 1e-8.
+            let second = (high - 2.0 * here + low) / 1e-8;
+            assert!((weight - (-second).max(0.0)).abs() < 1e-5, "{margin}: {weight} {second}");
+            assert!((log_likelihood(-1.0, margin) - log_probability(-margin)).abs() < 1e-15);
+            assert!((bend(-1.0, margin).0 + derivatives(-margin).0).abs() < 1e-15);
+        }
+        // A thousandth at the top of the density, all of it far away.
+        assert!(
+            (log_likelihood(0.0, 1.0) + 0.5).abs() < 2e-3
+                && (log_likelihood(0.0, 1e6) - OTHER_DENSITY.ln()).abs() < 1e-12
+        );
+        assert!(
+            (drawn_value(0.3, 0.9) + 2.0 * log_likelihood(0.0, 0.3)).abs() < 1e-15 && drawn_value(0.3, 0.01) > 13.8
+        );
     }
 }

@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use crate::calculator::Smooth;
 use crate::diagnosis::rows::basis::{dot, orthonormal, smooth_columns};
 use crate::diagnosis::rows::data::Data;
-use crate::diagnosis::rows::link::information;
+use crate::diagnosis::rows::link::told;
 
 /// Correlations from row to row that are weighed.
 const CORRELATIONS: [f64; 8] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
@@ -94,12 +94,12 @@ impl Noise {
         noise
     }
 
-    /// Of classes with these margins: what a Gaussian row would scatter that said as much of its margin.
-    pub(in crate::diagnosis) fn informed(&self, margin: &[f64]) -> Self {
+    /// Of classes on these sides with these margins: what a Gaussian row would scatter that said as much of its margin.
+    pub(in crate::diagnosis) fn informed(&self, sides: &[f64], margin: &[f64]) -> Self {
         let own = |row: usize| self.per_row.as_ref().map_or(self.sigma, |own| own[row]);
         // A class far from the boundary says nothing; its row stays finite.
-        let of_row = |(row, margin): (usize, &f64)| own(row) / information(margin / own(row)).max(1e-12).sqrt();
-        Self { per_row: Some(margin.iter().enumerate().map(of_row).collect()), ..self.clone() }
+        let of_row = |row: usize| own(row) / told(sides[row], margin[row] / own(row)).max(1e-12).sqrt();
+        Self { per_row: Some((0..margin.len()).map(of_row).collect()), ..self.clone() }
     }
 
     /// Of the margins of classes, which say too little to find it from them.

@@ -16,14 +16,14 @@ const HALVINGS: usize = 40;
 /// Twice what a further Newton step would gain: far below what changes a probability.
 const SETTLED: f64 = 1e-12;
 
-/// Rows of which only the side of zero is known on which their margin lay.
+/// Rows of which only the side of zero is known on which their margin lay, and rows beside them that were measured to stand at zero.
 ///
 /// P(side s) = F(s (f + N d)/sigma), d ~ N(0, I), F as in `link`. A column is in units of sigma; "what is left" is minus the margin, as
 /// if every row had been measured to stand on the boundary: then what is left of any linear model is read as for values.
 pub(in crate::diagnosis) struct ClassLikelihood {
     /// Rows that count.
     rows: Vec<usize>,
-    /// +1 or -1.
+    /// +1 or -1; 0 of a value.
     sides: Vec<f64>,
     sigma: Vec<f64>,
     nuisances: Vec<Vec<f64>>,
@@ -119,14 +119,14 @@ impl ClassLikelihood {
             margin
         };
         let log_likelihood = |margin: &[f64]| -> f64 {
-            margin.iter().zip(&self.sides).map(|(margin, side)| link::log_probability(side * margin)).sum()
+            margin.iter().zip(&self.sides).map(|(margin, side)| link::log_likelihood(*side, *margin)).sum()
         };
         let mut size = DVector::zeros(count);
         let mut here = margin(&size);
         let mut value = log_likelihood(&here);
         for step in 0.. {
             let (slope, weight): (Vec<f64>, Vec<f64>) =
-                here.iter().zip(&self.sides).map(|(margin, side)| at(*margin, *side)).unzip();
+                here.iter().zip(&self.sides).map(|(margin, side)| link::bend(*side, *margin)).unzip();
             let mut curvature = DMatrix::identity(count, count);
             for i in 0..count {
                 let weighted: Vec<f64> = design[i].iter().zip(&weight).map(|(c, w)| c * w).collect();
@@ -162,10 +162,4 @@ impl ClassLikelihood {
         }
         None
     }
-}
-
-/// d ln F(s m)/dm and minus its second derivative.
-fn at(margin: f64, side: f64) -> (f64, f64) {
-    let (slope, weight) = link::derivatives(side * margin);
-    (side * slope, weight)
 }

@@ -106,11 +106,11 @@ fn test(kind: TestKind, statistic: f64, dof: (f64, Option<f64>), p: f64) -> Opti
 const DRAWS: usize = 2000;
 
 /// D = -2 sum of ln F(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
-/// drawn: allowances from their prior, classes from the margins under them.
+/// drawn: allowances from their prior, classes from the margins under them. Values beside them are drawn about the base.
 fn deviance(weighing: &Weighing<'_>, sides: &[f64], monitor: &dyn Monitor) -> Result<Option<Test>, Failure> {
     let foundation = weighing.foundation;
     let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
-    let of = |side: f64, row: usize| -2.0 * link::log_probability(side * foundation.base[row] / weighing.scatter(row));
+    let of = |side: f64, row: usize| -2.0 * link::log_likelihood(side, foundation.base[row] / weighing.scatter(row));
     let found: f64 = rows.iter().map(|&row| of(sides[row], row)).sum();
     let mut random = Pcg64::seed_from_u64(1);
     let normal = Normal::standard();
@@ -124,6 +124,10 @@ fn deviance(weighing: &Weighing<'_>, sides: &[f64], monitor: &dyn Monitor) -> Re
             .iter()
             .map(|&row| {
                 let moved: f64 = sizes.iter().zip(&nuisances).map(|(size, column)| size * column[row]).sum();
+                if link::is_value(sides[row]) {
+                    let scatter = normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12));
+                    return link::drawn_value(scatter - moved / weighing.scatter(row), random.random());
+                }
                 let positive = link::log_probability((foundation.base[row] + moved) / weighing.scatter(row)).exp();
                 of(if random.random::<f64>() < positive { 1.0 } else { -1.0 }, row)
             })

@@ -461,11 +461,12 @@ impl<'a> Weighing<'a> {
         kind.deviation(remainder, &columns, &residual, &self.linear.likelihood)
     }
 
-    /// What a row costs a prediction that leaves so much: the square; of a class twice minus the log-probability of it.
+    /// What a row costs a prediction that leaves so much: the square; of a class, and of a value beside classes, twice
+    /// minus the logarithm of its probability.
     pub(in crate::diagnosis) fn loss(&self, row: usize, left: f64) -> f64 {
         match &self.foundation.data.sides {
             None => left * left,
-            Some(sides) => -2.0 * link::log_probability(-sides[row] * left / self.scatter(row)),
+            Some(sides) => -2.0 * link::log_likelihood(sides[row], -left / self.scatter(row)),
         }
     }
 
@@ -520,7 +521,11 @@ fn about_leader(
         }
         None => foundation.base.clone(),
     };
-    Ok(Whitener::new(foundation.data, &noise.informed(&margin), &foundation.nuisances, keep))
+    let informed = match &foundation.data.sides {
+        Some(sides) => noise.informed(sides, &margin),
+        None => noise.clone(),
+    };
+    Ok(Whitener::new(foundation.data, &informed, &foundation.nuisances, keep))
 }
 
 /// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes

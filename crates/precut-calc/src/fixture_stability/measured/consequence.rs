@@ -29,10 +29,14 @@ pub(in crate::fixture_stability) fn consequences(
         Ok(limits.into_iter().next().and_then(Result::ok).filter(|depth| *depth > 0.0))
     };
     let Some(chosen_mm) = limit_mm(believed)? else { return Ok(Vec::new()) };
-    let values = acting
-        .par_iter()
-        .map(|effects| Ok(limit_mm(effects)?.map(|limit_mm| 100.0 * (limit_mm / chosen_mm - 1.0))))
-        .collect::<Result<_, Failure>>()?;
+    let limits: Vec<Option<f64>> =
+        acting.par_iter().map(|effects| limit_mm(effects)).collect::<Result<_, Failure>>()?;
+    Ok(vec![depth_margin(chosen_mm, &limits)])
+}
+
+/// How far limits of depth lie above one that was promised, in percent of it: below 0 a cut at the promised depth chatters.
+pub(crate) fn depth_margin(promised_mm: f64, limits_mm: &[Option<f64>]) -> Consequence {
+    let of = |limit: &Option<f64>| limit.map(|limit_mm| 100.0 * (limit_mm / promised_mm - 1.0));
     let allowed = Some(Allowed::AtLeast(0.0));
-    Ok(vec![Consequence { name: "depth_margin_percent", unit: "percent", allowed, values }])
+    Consequence { name: "depth_margin_percent", unit: "percent", allowed, values: limits_mm.iter().map(of).collect() }
 }

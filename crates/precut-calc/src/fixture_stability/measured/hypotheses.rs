@@ -4,7 +4,7 @@ use crate::calculator::{
     Condition, Design, Expansions, Failure, Grouping, Hypotheses, Hypothesis, Inapplicability, Inapplicable, Monitor,
     Range, Shape, Smooth, Treatment, Variable, values_by_name,
 };
-use crate::effects::{Cause, FIXTURE_CAUSES, Fit, FixtureEffect, Parameter};
+use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect, Parameter};
 use crate::fixture_stability::answer::study::forced_span_mm;
 use crate::fixture_stability::measured::forward::Measure;
 use crate::fixture_stability::measured::margins::or_missing;
@@ -17,12 +17,12 @@ const RUNOUT_SHARE: f64 = 0.9;
 /// A mass below this is none, kg.
 const NO_MASS_KG: f64 = 1e-4;
 /// Sizes about which a runout is linearised, prior standard deviations.
-const EXPANSIONS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+pub(crate) const RUNOUTS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 /// Prior standard deviation of a mass that swings on the workpiece, as a share of the workpiece's.
 const HUNG_SHARE: f64 = 0.1;
 /// Sizes about which what shifts a resonance is linearised, prior standard deviations: one of a tenth in frequency moves it by
 /// its own width, and a straight line through none of it ends long before.
-const SHIFTS: [f64; 3] = [0.5, 1.0, 1.5];
+pub(crate) const SHIFTS: [f64; 3] = [0.5, 1.0, 1.5];
 /// The same of joints that harden: near the onset of chatter a little of it does as much as much of it does elsewhere.
 const HARDENINGS: [f64; 4] = [0.1, 0.3, 1.0, 3.0];
 /// Prior standard deviation of what hardening adds to the stiffness at the swings of the rows: that of the stiffness itself.
@@ -115,20 +115,7 @@ impl Experiment<'_> {
             "contact_hardening" => return self.hardening(parameter, Range { lower, upper }),
             _ => {}
         }
-        let treatment = match parameter.fit {
-            Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },
-            Fit::Shape { grid } => Treatment::Shape { grid: grid.to_vec(), prior: None },
-            Fit::Fixed { default } => Treatment::Stated { value: default },
-            Fit::OfJob => Treatment::Stated { value: 0.0 },
-        };
-        Ok(match parameter.fit {
-            // Its logarithm is 0 where it is absent, and a factor of 2 as far as one of 1/2.
-            Fit::Factor => {
-                let range = Range { lower: lower.ln(), upper: upper.ln() };
-                Variable { name: "ln_factor", unit: "1", treatment, range }
-            }
-            _ => Variable { name: parameter.name, unit: parameter.unit, treatment, range: Range { lower, upper } },
-        })
+        Ok(Variable::of(parameter, Range { lower, upper }))
     }
 }
 
@@ -209,17 +196,8 @@ pub(in crate::fixture_stability) fn values(hypothesis: &Hypothesis, effect: &Fix
 /// shifts one, or makes joints stiffer where they move most, does not do so in a straight line.
 pub(in crate::fixture_stability) fn expansions(hypothesis: &Hypothesis) -> Expansions {
     match (hypothesis.cause.kind, hypothesis.variables.as_slice()) {
-        ("tooth_runout", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => Expansions::along(
-            EXPANSIONS
-                .iter()
-                .map(|share| share * prior_sd)
-                .filter(|size| *size < range.upper)
-                .flat_map(|size| [size, -size]),
-        ),
-        ("stiffness" | "mass" | "jaw_mass", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => {
-            let sizes = SHIFTS.iter().flat_map(|share| [share * prior_sd, -share * prior_sd]);
-            Expansions::along(sizes.filter(|size| (range.lower..=range.upper).contains(size)))
-        }
+        ("tooth_runout", [runout]) => Expansions::either_way(runout, &RUNOUTS),
+        ("stiffness" | "mass" | "jaw_mass", [factor]) => Expansions::either_way(factor, &SHIFTS),
         ("contact_hardening", [Variable { treatment: Treatment::Amplitude { prior_sd }, range, .. }]) => {
             Expansions::along(HARDENINGS.iter().map(|share| share * prior_sd).filter(|size| *size <= range.upper))
         }
@@ -233,12 +211,7 @@ pub(in crate::fixture_stability) fn expansions(hypothesis: &Hypothesis) -> Expan
 /// Rows of one working point are repeats; rows of one speed are held back together. Of histories, rows of one run are.
 pub(in crate::fixture_stability) fn design(prepared: &PreparedFixture) -> Design {
     let rows = &prepared.rows;
-    let numbered = |key: &dyn Fn(&PreparedRow) -> [u64; 5]| -> Vec<usize> {
-        let mut keys: Vec<[u64; 5]> = rows.iter().map(key).collect();
-        keys.sort_unstable();
-        keys.dedup();
-        rows.iter().map(|row| keys.partition_point(|known| *known < key(row))).collect()
-    };
+    let numbered = |key: &dyn Fn(&PreparedRow) -> [u64; 5]| Design::numbered(&rows.iter().map(key).collect::<Vec<_>>());
     let speed = |row: &PreparedRow| row.working.spindle_rpm.to_bits();
     let depth = |row: &PreparedRow| row.working.depth_mm.to_bits();
     if prepared.measure == Measure::Displacement {

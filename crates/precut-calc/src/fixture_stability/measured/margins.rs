@@ -17,7 +17,7 @@ const LOOKED_FOR: [f64; 3] = [4.0, 16.0, 64.0];
 /// Step of the logarithm of the depth for the growth of ln|mu|: its truncation is of order 1e-4 of the curvature.
 const STEP: f64 = 0.01;
 /// Least growth: where |mu| but grazes 1, a margin in terms of depth would be as long as one likes.
-const FLATTEST: f64 = 0.1;
+pub(crate) const FLATTEST: f64 = 0.1;
 /// Least share of the clamp force that a cut asks for: no force at all is as bad as a thousandth.
 const LEAST_CLAMP: f64 = 1e-3;
 /// Speeds of a limit that is drawn, before it is refined.
@@ -45,10 +45,8 @@ impl PreparedFixture {
             let most_mm = times * deepest;
             let found = critical_depth(&self.rules, holding, cutting, working, most_mm, monitor)?;
             if let Some(limit) = found.depth_mm {
-                let at = |shift: f64| {
-                    self.log_modulus(&self.base, Working { depth_mm: limit * shift.exp(), ..working }, monitor)
-                };
-                return Ok(((at(STEP)? - at(-STEP)?) / (2.0 * STEP)).max(FLATTEST));
+                let at = |depth_mm: f64| self.log_modulus(&self.base, Working { depth_mm, ..working }, monitor);
+                return Ok(steepness(limit, at)?.max(FLATTEST));
             }
         }
         Ok(1.0)
@@ -103,6 +101,9 @@ impl PreparedFixture {
             let found = boundary(&self.rules, &case.holding, &case.cutting, &plane, monitor, &mut |_, _| {});
             Ok(or_missing(found)?.ok().map(|found| LimitCurve {
                 feed_mm_per_tooth: feed_mm,
+                width_mm: None,
+                low_mm: Vec::new(),
+                high_mm: Vec::new(),
                 spindle_speed_rpm: found.iter().map(|point| point.spindle_rpm).collect(),
                 depth_mm: found.iter().map(|point| point.crossings_mm.first().copied()).collect(),
             }))
@@ -111,6 +112,12 @@ impl PreparedFixture {
         let curves = curves.into_iter().flatten().collect();
         Ok(ClassLimits { spindle_speed_rpm: speeds, depth_mm: depths, curves })
     }
+}
+
+/// g = d ln|mu|/d ln H at a limit (`fixture/7.1`), by a central difference.
+pub(crate) fn steepness(limit_mm: f64, log_modulus: impl Fn(f64) -> Result<f64, Failure>) -> Result<f64, Failure> {
+    let at = |shift: f64| log_modulus(limit_mm * shift.exp());
+    Ok((at(STEP)? - at(-STEP)?) / (2.0 * STEP))
 }
 
 /// Joints that harden may have no forced motion about which to ask.

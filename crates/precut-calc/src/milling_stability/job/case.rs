@@ -46,7 +46,8 @@ impl Case {
             }
         }
         let width_mm = milling.radius_mm * (milling.entry_rad.cos() - milling.exit_rad.cos());
-        Some(Self { milling, structure: Structure::new(modes), rotation, depth_mm: job.cut.depth_mm, width_mm })
+        let (structure, depth_mm) = (Structure::new(modes), job.cut.depth_mm);
+        Some(Self { milling, structure, rotation, depth_mm, width_mm }.with_effects(&job.effects))
     }
 
     /// The cut of the job.

@@ -49,6 +49,8 @@ pub(in crate::milling_stability) const CODES: &[&str] = &[
     "spindle_row_without_limit",
     "spindle_speeds_unordered",
     "certainty_of_nothing",
+    "duplicate_effect",
+    "effect_without_mode",
 ];
 
 /// S and S_z that both are given may differ by so much.
@@ -70,6 +72,7 @@ impl Check for Job {
         check_force(self, &measured, violations);
         check_spindle(self, violations);
         check_certainty(self, violations);
+        super::acting::check(self, violations);
         check_cost(self, violations);
     }
 }

@@ -5,6 +5,7 @@ use utoipa::openapi::schema::OneOfBuilder;
 use utoipa::openapi::{RefOr, Schema};
 use utoipa::{PartialSchema, ToSchema};
 
+use crate::effects::MillingEffect;
 use crate::fixture_stability::{Spindle, SpindlePoint, Vise};
 use crate::force::choice;
 use crate::receptance_fit::{Job as FitJob, ReceptanceFile, Residuals};
@@ -65,6 +66,10 @@ pub struct Job {
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("numerics"))))]
     pub lobes: LobePlane,
+    /// Named physical effects that act beside the base model; a kind occurs once, of modes once for each mode.
+    #[serde(default)]
+    #[schema(max_items = 64, extensions(("x-group" = json!("effects"))))]
+    pub effects: Vec<MillingEffect>,
 }
 
 fn usual_analyses() -> Vec<Asked> {

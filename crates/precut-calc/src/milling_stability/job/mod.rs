@@ -1,5 +1,6 @@
 //! The job, what may stand in it, and the model that it means.
 
+mod acting;
 mod case;
 mod check;
 mod held;
@@ -7,6 +8,7 @@ mod input;
 mod measured;
 mod uncertain;
 
+pub(super) use acting::beyond_modes;
 pub(super) use case::{Case, range_rpm, varying};
 pub(super) use check::{CODES, modes, too_expensive, way};
 pub(super) use held::Held;

@@ -9,7 +9,7 @@ use crate::certainty::{
 };
 use crate::fixture_stability::usual_scatter::{CUTTING_FORCE, DAMPING, FRICTION, SET_BY_HAND, SET_BY_PRESSURE};
 
-use super::super::model::{Law, Milling, Mode, Side, Structure};
+use super::super::model::{Milling, Mode, Side, Structure};
 use super::case::Case;
 use super::held::PartClamping;
 use super::input::{Job, Yielding};
@@ -19,8 +19,6 @@ use super::measured::Fit;
 const MODE_FREQUENCY_PERCENT: f64 = 2.0;
 const MODE_STIFFNESS: f64 = 0.10;
 const RUNOUT: f64 = 0.20;
-/// No mode is damped more than this share of critical.
-const MOST_DAMPED: f64 = 0.99;
 
 /// A quantity of a cut that is not known exactly; all are factors on what the job states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -325,7 +323,7 @@ pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQua
             MillingQuantity::Friction => draw.friction = factor,
             _ => {
                 draw.force = factor;
-                scale(&mut draw.milling.law, factor);
+                draw.milling.law.scale([factor; 3]);
             }
         }
     }
@@ -334,23 +332,9 @@ pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQua
 
 fn put(part: Part, factor: f64, mode: &mut Mode) {
     match part {
-        // At the same stiffness.
-        Part::Frequency => {
-            mode.frequency_hz *= factor;
-            mode.mass_kg /= factor * factor;
-        }
-        // At the same frequency.
-        Part::Stiffness => mode.mass_kg *= factor,
-        Part::Damping => mode.damping_ratio = (mode.damping_ratio * factor).min(MOST_DAMPED),
-    }
-}
-
-fn scale(law: &mut Law, factor: f64) {
-    match law {
-        Law::Mechanistic { edge, cutting } => {
-            edge.iter_mut().chain(cutting).for_each(|part| *part *= factor);
-        }
-        Law::Power { at_1_mm, .. } => at_1_mm.iter_mut().for_each(|part| *part *= factor),
+        Part::Frequency => mode.tune(factor),
+        Part::Stiffness => mode.stiffen(factor),
+        Part::Damping => mode.damp(factor),
     }
 }
 

@@ -47,6 +47,15 @@ impl Law {
         matches!(self, Self::Power { exponent, .. } if exponent.iter().any(|e| *e > 0.0))
     }
 
+    /// Times a factor for each component.
+    pub fn scale(&mut self, factor: Vector) {
+        let times = |of: &mut Vector| of.iter_mut().zip(factor).for_each(|(part, factor)| *part *= factor);
+        match self {
+            Self::Mechanistic { edge, cutting } => [edge, cutting].into_iter().for_each(times),
+            Self::Power { at_1_mm, .. } => times(at_1_mm),
+        }
+    }
+
     /// Force per mm of edge, N/mm.
     pub fn force(&self, chip_mm: f64) -> Vector {
         match self {

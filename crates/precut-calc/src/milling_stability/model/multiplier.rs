@@ -5,7 +5,7 @@ use crate::num::dde::{Rule, largest_paced, largest_pair_paced};
 
 use super::forced::{Forced, forced};
 use super::map::{Cut, Map};
-use super::shares::{Shares, shares, transient_growth};
+use super::shares::{Alias, Shares, shares, transient_growth};
 use super::slow::{MOST_OSCILLATIONS, slow_forced};
 use super::slow_period::{SlowMultiplier, slow_multiplier};
 
@@ -109,30 +109,35 @@ impl Orders {
     /// Frequencies and modes of the disturbance that grows most or decays least (`milling/4.19`); `None` where there is none or
     /// the period is so long that its aliases lie side by side.
     pub fn shares(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Shares>, Failure> {
-        let Some((map, found, vector)) = self.leading_pair(cut, monitor)? else { return Ok(None) };
+        let Some((map, found, vector)) = leading_pair(cut, &self.usual, TOLERANCE, monitor)? else { return Ok(None) };
         shares(cut, &map, (found.re, found.im), &vector, POINTS, monitor)
+    }
+
+    /// To the accuracy of maps, with the frequencies of the disturbance by falling share; none are told where the period is so long that
+    /// they lie side by side. `None` where the equations are singular.
+    pub fn heard_on_map(
+        &self,
+        cut: &Cut<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<(Multiplier, Vec<Alias>)>, Failure> {
+        if cut.is_slow() && cut.repeats() {
+            let slow = slow_multiplier(cut, false, monitor)?;
+            let alias = Alias { frequency_hz: slow.frequency_hz, share: 1.0 };
+            return Ok(Some((slow.counted(), vec![alias])));
+        }
+        let pair = leading_pair(cut, &self.coarse, COARSE_TOLERANCE, monitor)?;
+        let Some((map, found, vector)) = pair.filter(|(_, found, _)| found.modulus().is_finite()) else {
+            return Ok(None);
+        };
+        let shares = shares(cut, &map, (found.re, found.im), &vector, COARSE, monitor)?;
+        Ok(Some((found, shares.map_or_else(Vec::new, |shares| shares.aliases))))
     }
 
     /// How many times the leading disturbance grows at most from one tooth to a later one within a period (`milling/4.18`); `None`
     /// where there is none.
     pub fn transient_growth(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<f64>, Failure> {
-        let pair = self.leading_pair(cut, monitor)?;
+        let pair = leading_pair(cut, &self.usual, TOLERANCE, monitor)?;
         Ok(pair.map(|(map, found, vector)| transient_growth(cut, &map, found.modulus(), &vector, POINTS)))
-    }
-
-    /// The map with its leading eigenvalue and eigenvector.
-    fn leading_pair(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<Pair>, Failure> {
-        let Some(map) = Map::new(cut, &self.usual, monitor)? else { return Ok(None) };
-        let mut pace = Pace::new(monitor);
-        let mut applying = Pace::new(monitor);
-        let apply = |vector: &mut [f64]| {
-            map.apply(vector);
-            applying.work(map.work())
-        };
-        let (found, vector) =
-            largest_pair_paced(map.dimension(), POWER_STEPS, TOLERANCE, apply, |done| pace.work(done))?;
-        let found = Multiplier { re: found.re, im: found.im, residual: found.residual };
-        Ok(vector.map(|vector| (map, found, vector)))
     }
 
     /// The motion that repeats itself from period to period (`milling/4.20`); `None` where there is none.
@@ -162,6 +167,25 @@ impl Orders {
 
 /// A map, its leading multiplier, and the real and imaginary part of its eigenvector.
 type Pair = (Map, Multiplier, (Vec<f64>, Vec<f64>));
+
+/// The map with its leading eigenvalue and eigenvector.
+fn leading_pair<const P: usize>(
+    cut: &Cut<'_>,
+    rule: &Rule<P>,
+    tolerance: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<Pair>, Failure> {
+    let Some(map) = Map::new(cut, rule, monitor)? else { return Ok(None) };
+    let mut pace = Pace::new(monitor);
+    let mut applying = Pace::new(monitor);
+    let apply = |vector: &mut [f64]| {
+        map.apply(vector);
+        applying.work(map.work())
+    };
+    let (found, vector) = largest_pair_paced(map.dimension(), POWER_STEPS, tolerance, apply, |done| pace.work(done))?;
+    let found = Multiplier { re: found.re, im: found.im, residual: found.residual };
+    Ok(vector.map(|vector| (map, found, vector)))
+}
 
 /// The leading multiplier and the condition of it as an eigenvalue, 1 at least.
 fn conditioned<const P: usize>(

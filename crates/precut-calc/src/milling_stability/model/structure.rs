@@ -10,6 +10,8 @@ use super::cutter::Vector;
 
 /// m x'' in kg mm/s2 over the force in N.
 const MM_PER_S2: f64 = 1000.0;
+/// No mode is damped more than this share of critical.
+const MOST_DAMPED: f64 = 0.99;
 
 /// Whose mode it is. Force and counter-force make both enter alike.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +46,22 @@ impl Mode {
     /// Modal stiffness at the cut, N/mm.
     pub fn stiffness_n_per_mm(&self) -> f64 {
         self.mass_kg * self.rad_per_s().powi(2) / MM_PER_S2
+    }
+
+    /// The natural frequency times a factor, at the same stiffness.
+    pub fn tune(&mut self, factor: f64) {
+        self.frequency_hz *= factor;
+        self.mass_kg /= factor * factor;
+    }
+
+    /// The stiffness times a factor, at the same frequency.
+    pub fn stiffen(&mut self, factor: f64) {
+        self.mass_kg *= factor;
+    }
+
+    /// The damping times a factor.
+    pub fn damp(&mut self, factor: f64) {
+        self.damping_ratio = (self.damping_ratio * factor).min(MOST_DAMPED);
     }
 
     /// q' = A q + b F of (x, x'/w).

@@ -25,7 +25,8 @@ pub(super) fn plane(classes: &ClassReport) -> Figure {
         };
         curves.iter().map(line).collect()
     };
-    let mut items = limits(&classes.limits_base, "diagnosis_limit_base", Role::Before);
+    let mut items: Vec<Item> = classes.limit_band.iter().flat_map(bands).collect();
+    items.extend(limits(&classes.limits_base, "diagnosis_limit_base", Role::Before));
     items.extend(limits(&classes.limits_extended, "diagnosis_limit_extended", Role::After));
     let known = [
         ("stable", "diagnosis_stable", Role::Stable),
@@ -39,4 +40,22 @@ pub(super) fn plane(classes: &ClassReport) -> Figure {
         Axis::linear("diagnosis_spindle_speed", "rev/min"),
         vec![panel(Axis::linear("diagnosis_depth", "mm"), items)],
     )
+}
+
+/// The interval of a limit, one area for every stretch of speeds that has one.
+fn bands(curve: &LimitCurve) -> Vec<Item> {
+    let at = |k: usize| Some((curve.spindle_speed_rpm[k], (*curve.low_mm.get(k)?)?, (*curve.high_mm.get(k)?)?));
+    let known: Vec<Option<(f64, f64, f64)>> = (0..curve.spindle_speed_rpm.len()).map(at).collect();
+    let stretches = known.split(Option::is_none).filter(|stretch| stretch.len() > 1);
+    let area = |stretch: &[Option<(f64, f64, f64)>]| {
+        let of = |part: fn(&(f64, f64, f64)) -> f64| stretch.iter().flatten().map(part).collect();
+        Item::Band {
+            name: "diagnosis_band",
+            x: of(|at| at.0),
+            lower: of(|at| at.1),
+            upper: of(|at| at.2),
+            role: Role::Uncertainty,
+        }
+    };
+    stretches.map(area).collect()
 }
