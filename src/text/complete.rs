@@ -95,6 +95,7 @@ const LATIN: &[&str] = &[
     // Values of fields, and an example of a name.
     "around",
     "common",
+    "frequency",
     "quadratic",
     "from",
     "held",

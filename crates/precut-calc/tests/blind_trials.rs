@@ -24,7 +24,8 @@ use std::path::Path;
 
 use precut_calc::calculator::{Calculator, Check, Diagnosable, Measurement, Unwatched, Violations};
 use precut_calc::diagnosis::{
-    Diagnosis, JobOf, NamedCause, ResultOf, SetReport, VerdictClass, residuals_with, separation_from, separations_of,
+    Diagnosis, JobOf, NamedCause, ParameterReport, ResultOf, SetReport, VerdictClass, residuals_with, separation_from,
+    separations_of,
 };
 use precut_trials::score::{HeldOut, Said, Score, Share};
 use precut_trials::{Class, Hidden, Scatter, Trial, deflection, machinability};
@@ -347,11 +348,16 @@ fn separations<M: Diagnosable>(trial: &Trial, job: &JobOf<M>) -> Vec<f64> {
     separations_of::<M>(job, &changes).unwrap()
 }
 
-/// Whether the 95 % interval of the first parameter of a named cause holds what was hidden, for every cause named right.
+/// The parameter of a named cause that is the hidden size: the first that is none of the others.
+fn sized<'n>(hidden: &Hidden, named: &'n NamedCause) -> Option<&'n ParameterReport> {
+    named.parameters.iter().find(|own| !hidden.shapes.iter().any(|(other, _)| *other == own.name))
+}
+
+/// Whether the 95 % interval of the size of a named cause holds what was hidden, for every cause named right.
 pub(crate) fn covered(trial: &Trial, named: &[NamedCause]) -> Vec<bool> {
     let of = |hidden: &Hidden| {
         let named = named.iter().find(|cause| cause.kind == hidden.kind)?;
-        let [low, high] = named.parameters[0].interval_95?;
+        let [low, high] = sized(hidden, named)?.interval_95?;
         Some((low..=high).contains(&hidden.size))
     };
     trial.truth.causes.iter().filter_map(of).collect()
@@ -397,7 +403,7 @@ fn talk<M: Diagnosable>(trial: &Trial, result: &ResultOf<M>) {
     println!("     lack of fit of the base {:?}", base.and_then(|base| base.lack_of_fit_p));
     for hidden in &trial.truth.causes {
         let Some(named) = result.named.iter().find(|cause| cause.kind == hidden.kind) else { continue };
-        let first = &named.parameters[0];
+        let Some(first) = sized(hidden, named) else { continue };
         println!("     {} hidden {:.5} fitted {:.5} in {:?}", hidden.kind, hidden.size, first.value, first.interval_95);
         for (name, truth) in &hidden.shapes {
             let own = named.parameters.iter().find(|parameter| parameter.name == *name).unwrap();

@@ -19,6 +19,8 @@ const LISTENED: f64 = 0.6;
 /// Step of the logarithm of the depth for the slope of growth, and the least slope.
 const SLOPE_STEP: f64 = 0.05;
 const FLATTEST: f64 = 0.03;
+/// Rubbing of the flank at a size of 1.
+const RUBBING_N_PER_MM: f64 = 3000.0;
 /// Largest shift of the limit at one speed that no catalogue holds.
 const ODD_SHIFT: f64 = 0.8;
 
@@ -117,7 +119,7 @@ fn attempt(class: Class, given: Option<Size>, shift: f64, random: &mut Random) -
         }
         let scaled = scaled(cause, &rig, shift * scatter, random)?;
         scaled.act(&mut mill);
-        causes.push(hidden(cause.kind, scaled.told(), scaled.shapes(), shift));
+        causes.push(hidden(cause.kind, scaled.told(&mill), scaled.shapes(), shift));
     }
     let level = random.uniform_sd(LEVEL);
     let mut rows = Vec::new();
@@ -210,13 +212,17 @@ impl Scaled {
             }
             "radial_ratio" => mill.radial_n_per_mm2 *= factor,
             "tooth_runout" => mill.runout_mm += self.size * mill.feed_mm,
-            _ => mill.rubbing_n_per_mm += self.size * 3000.0,
+            _ => mill.rubbing_n_per_mm += self.size * RUBBING_N_PER_MM,
         }
     }
 
-    /// The first number of the effect that is no mode.
-    fn told(&self) -> f64 {
-        self.size
+    /// The number of the effect that is no mode: a factor, mm, or N/mm.
+    fn told(&self, mill: &Mill) -> f64 {
+        match self.cause.kind {
+            "tooth_runout" => self.size * mill.feed_mm,
+            "process_damping" => self.size * RUBBING_N_PER_MM,
+            _ => self.size.exp(),
+        }
     }
 
     fn shapes(&self) -> Vec<(&'static str, f64)> {
