@@ -122,8 +122,12 @@ impl DeflectionQuantity {
             Self::TailstockCompliance => Some("tailstock_compliance"),
             Self::CarriageCompliance => Some("carriage_compliance"),
             // What an offset was says nothing of how the tool is set the next time.
-            Self::ToolSetting => None,
-            Self::Stiffness | Self::RestCompliance | Self::RestGap | Self::StockDiameter | Self::SpindleScatter => None,
+            Self::ToolSetting
+            | Self::Stiffness
+            | Self::RestCompliance
+            | Self::RestGap
+            | Self::StockDiameter
+            | Self::SpindleScatter => None,
         }
     }
 

@@ -216,12 +216,12 @@ impl Scaled {
         }
     }
 
-    /// The number of the effect that is no mode: a factor, mm, or N/mm.
+    /// The number of the effect that is no mode, as a diagnosis tells it: the logarithm of a factor, mm, or N/mm.
     fn told(&self, mill: &Mill) -> f64 {
         match self.cause.kind {
             "tooth_runout" => self.size * mill.feed_mm,
             "process_damping" => self.size * RUBBING_N_PER_MM,
-            _ => self.size.exp(),
+            _ => self.size,
         }
     }
 
