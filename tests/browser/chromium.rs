@@ -123,6 +123,10 @@ impl Page {
             let Message::Text(text) = self.socket.read().unwrap() else { continue };
             let mut message: Value = serde_json::from_str(&text).unwrap();
             if message["id"] == id {
+                // A page that is being replaced says nothing, and is asked again.
+                if message["error"]["message"].as_str().is_some_and(|said| said.contains("navigated or closed")) {
+                    return json!({ "result": { "value": null } });
+                }
                 assert!(message.get("error").is_none(), "{method}: {}", message["error"]);
                 return message["result"].take();
             }
