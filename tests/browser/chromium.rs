@@ -80,6 +80,11 @@ impl Browser {
     }
 }
 
+/// The parameters that evaluate an expression; a promise is waited for.
+fn evaluated(expression: &str) -> Value {
+    json!({"expression": expression, "awaitPromise": true, "returnByValue": true})
+}
+
 impl Page {
     /// A fresh page; `None` where there is no browser.
     pub fn new() -> Option<Self> {
@@ -112,6 +117,11 @@ impl Page {
 
     /// Sends a command and waits for its answer. What the page complains of meanwhile is kept.
     pub fn call(&mut self, method: &str, parameters: Value) -> Value {
+        self.asked(method, parameters).unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    /// The same, or what the browser has against it.
+    fn asked(&mut self, method: &str, parameters: Value) -> Result<Value, Value> {
         self.last += 1;
         let id = self.last;
         let mut command = json!({"id": id, "method": method, "params": parameters});
@@ -123,12 +133,10 @@ impl Page {
             let Message::Text(text) = self.socket.read().unwrap() else { continue };
             let mut message: Value = serde_json::from_str(&text).unwrap();
             if message["id"] == id {
-                // A page that is being replaced says nothing, and is asked again.
-                if message["error"]["message"].as_str().is_some_and(|said| said.contains("navigated or closed")) {
-                    return json!({ "result": { "value": null } });
-                }
-                assert!(message.get("error").is_none(), "{method}: {}", message["error"]);
-                return message["result"].take();
+                return match message.get_mut("error") {
+                    Some(error) => Err(error.take()),
+                    None => Ok(message["result"].take()),
+                };
             }
             self.note(&message);
         }
@@ -157,8 +165,7 @@ impl Page {
 
     /// The value of an expression; a promise is waited for.
     pub fn evaluate(&mut self, expression: &str) -> Value {
-        let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
-        let mut answer = self.call("Runtime.evaluate", parameters);
+        let mut answer = self.call("Runtime.evaluate", evaluated(expression));
         assert!(answer.get("exceptionDetails").is_none(), "{expression}: {}", answer["exceptionDetails"]);
         answer["result"]["value"].take()
     }
@@ -176,7 +183,14 @@ impl Page {
     /// Whether an expression is true; not while the page is being replaced.
     fn holds(&mut self, expression: &str) -> bool {
         let guarded = format!("(() => {{ try {{ return Boolean({expression}) }} catch {{ return false }} }})()");
-        self.evaluate(&guarded) == true
+        match self.asked("Runtime.evaluate", evaluated(&guarded)) {
+            Ok(answer) => answer["result"]["value"] == true,
+            Err(error) => {
+                let said = error["message"].as_str().unwrap_or_default();
+                assert!(said.contains("navigated or closed"), "{expression}: {error}");
+                false
+            }
+        }
     }
 
     /// Waits for an element.

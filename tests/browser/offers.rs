@@ -40,6 +40,11 @@ fn the_strip_of_a_diagnosis_says_what_is_named_how_surely_and_what_it_gains() {
     let told = page.evaluate(HEADLINE);
     assert!(told["Something that is not in the list"].as_str().unwrap().ends_with('%'), "{told}");
     assert_eq!(page.text("#take"), "Print the sheet");
+    // Which mode it is stands in the name; the size is what was fitted.
+    page.open(&service.page("diagnosis?example=chatter_log"));
+    page.until(&format!("{SETTLED} && document.querySelector('.verdict').textContent.includes('mode frequency')"));
+    let told = page.evaluate(HEADLINE);
+    assert!(told["Factor"].as_str().unwrap().starts_with("0.8791 ± 0.00"), "{told}");
     page.assert_calm();
 }
 

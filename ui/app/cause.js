@@ -178,7 +178,9 @@ export function causesHeadline(causes) {
   const share = (label, probability) => ({ label, text: percent(probability) });
   if (result.verdict === 'named') {
     const [first] = result.named;
-    const [size] = sizesOf(first.parameters, kinds.get(first.kind)?.properties, unit);
+    const sizes = sizesOf(first.parameters, kinds.get(first.kind)?.properties, unit);
+    // Of which mode it is stands in its name: what was fitted is the size.
+    const size = sizes.find(({ spread }) => typeof spread === 'number') ?? sizes[0];
     const likely =
       exactSet(result)?.posterior ??
       Math.min(...result.causes.filter(cause => result.named.some(one => isSame(one, cause))).map(cause => cause.probability));
