@@ -239,7 +239,7 @@ fn a_run_is_a_ring_with_its_own_settings() {
 fn next_rings_can_be_turned() {
     let job = job(&short());
     let rows = Rows { runs: vec![RingRun::default()], points: all_round(72, 0).collect() };
-    let next = RingRoundness::next_runs(&job, &rows, Ranges(&[]));
+    let next = RingRoundness::next_runs(&job, &rows, Ranges(&[]), &Unwatched).unwrap();
     let changes: Vec<&str> = next.iter().map(|run| run.changes).collect();
     assert_eq!(
         changes,

@@ -465,7 +465,7 @@ fn next_runs_keep_to_the_ranges_that_are_stated() {
     let runs: Vec<DeflectionRun> = serde_json::from_value(value["runs"].clone()).unwrap();
     let rows = Rows { runs, points: vec![(0, DeflectionPoint { z_mm: 100.0 })] };
     let depths = |ranges: &[ConditionRange]| -> Vec<f64> {
-        let next = DeflectionCompensation::next_runs(&base, &rows, Ranges(ranges));
+        let next = DeflectionCompensation::next_runs(&base, &rows, Ranges(ranges), &Unwatched).unwrap();
         next.into_iter().filter(|run| run.changes == "depth_mm").filter_map(|run| run.run.depth_mm).collect()
     };
     // Observed 0.3 to 1.2 mm.

@@ -332,7 +332,7 @@ fn less_damping_shows_in_depth_limits() {
 fn next_runs_can_be_cut() {
     let job = job();
     let rows = grid(&[300.0, 640.0], &[0.5, 1.0]);
-    let next = FixtureStability::next_runs(&job, &rows, Ranges(&[]));
+    let next = FixtureStability::next_runs(&job, &rows, Ranges(&[]), &Unwatched).unwrap();
     let of = |condition: &str| next.iter().filter(|run| run.changes == condition).count();
     // Both ends and four speeds near a lobe.
     assert_eq!((of("spindle_speed_rpm"), of("feed_mm_per_tooth"), of("depth_mm")), (6, 2, 2));

@@ -86,18 +86,8 @@ pub trait Diagnosable:
         job: &Self::Job,
         rows: &Rows<Self::Run, Self::Point>,
         ranges: Ranges<'_>,
-    ) -> Vec<NextRun<Self::Run, Self::Point>>;
-
-    /// The same where it takes so long to find them that somebody may wait for its end no more.
-    #[allow(clippy::type_complexity, reason = "the runs of another method, or why there are none")]
-    fn next_runs_watched(
-        job: &Self::Job,
-        rows: &Rows<Self::Run, Self::Point>,
-        ranges: Ranges<'_>,
-        _monitor: &dyn Monitor,
-    ) -> Result<Vec<NextRun<Self::Run, Self::Point>>, Failure> {
-        Ok(Self::next_runs(job, rows, ranges))
-    }
+        monitor: &dyn Monitor,
+    ) -> Result<NextRuns<Self::Run, Self::Point>, Failure>;
 
     /// Where a row of a next run would be measured, by the fields of a row; nothing where its run says it all, or where
     /// another point is of the same row.
@@ -259,6 +249,9 @@ pub(crate) fn values_by_name(hypothesis: &Hypothesis, effect: &impl Serialize) -
     };
     hypothesis.variables.iter().map(field).collect()
 }
+
+/// Runs that could be measured next.
+pub type NextRuns<R, P> = Vec<NextRun<R, P>>;
 
 /// A run that could be measured next.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,7 +44,7 @@ pub trait ForwardModel {
     /// The effects that a job holds.
     fn own_effects(job: &Self::Job) -> &[Self::Effect];
 
-    /// What the job says is not known of them, where it takes that.
+    /// How unsure the job says they are; nothing where a job cannot say it.
     fn open_effects(_job: &Self::Job) -> &[JointUncertainty] {
         &[]
     }

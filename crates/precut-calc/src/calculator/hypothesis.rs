@@ -141,7 +141,7 @@ impl Expansions {
         Self { places: values.into_iter().map(|value| vec![value]).collect(), nearest: usize::MAX, parts: 1 }
     }
 
-    /// So many prior standard deviations of a size to either side, as far as its range goes; none of what is no size.
+    /// A size at these multiples of its prior standard deviation, on both sides and within its range. Nothing of a shape.
     pub fn either_way(variable: &Variable, deviations: &[f64]) -> Self {
         let Treatment::Amplitude { prior_sd } = variable.treatment else { return Self::default() };
         let sizes = deviations.iter().flat_map(|share| [share * prior_sd, -share * prior_sd]);
@@ -176,8 +176,8 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// Of a parameter of the catalogue within these bounds. Of a factor the logarithm is fitted: it is 0 where it is absent, and a
-    /// factor of 2 as far as one of 1/2.
+    /// A parameter of the catalogue within these bounds. A factor is fitted by its logarithm, which is 0 where the factor is
+    /// absent, and as far for 2 as for 1/2.
     pub fn of(parameter: &Parameter, range: Range) -> Self {
         let treatment = match parameter.fit {
             Fit::Amplitude | Fit::Factor => Treatment::Amplitude { prior_sd: parameter.prior_sd },

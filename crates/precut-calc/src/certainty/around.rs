@@ -35,7 +35,7 @@ pub(crate) struct Asked<'a, Q, const K: usize, const S: usize> {
 pub(crate) struct Around<'a, Q, const K: usize, const S: usize> {
     asked: Asked<'a, Q, K, S>,
     surface: Surface,
-    /// Of every factor its median and the standard deviation of its logarithm.
+    /// Median of every factor, and the standard deviation of its logarithm.
     scales: Vec<(f64, f64)>,
     /// Change of every limit with every independent score.
     slopes: Vec<Vec<f64>>,
@@ -52,7 +52,7 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         let scales: Vec<(f64, f64)> =
             asked.uncertainties.of.iter().map(|one| (one.distribution.at(0.0), scale(one))).collect();
         let surface = Surface::of(&vec![true; asked.uncertainties.count()], &mut |x| {
-            // What is not known of effects comes in standard deviations.
+            // Effects are off by multiples of their standard deviation.
             let value = |i: usize| scales.get(i).map_or(x[i], |(median, scale)| median * (scale * x[i]).exp());
             let margins = asked.tried(&(0..x.len()).map(value).collect::<Vec<_>>())?;
             Ok(asked.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())

@@ -9,10 +9,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, de::DeserializeOwned};
-use serde_json::Value;
 
 use crate::calculator::{Failure, Finding, Violations};
-use crate::effects::{Catalogued, JointUncertainty, ParameterMove, has_parameter};
+use crate::effects::{Catalogued, JointUncertainty, ParameterMove, has_parameter, with_changed};
 
 /// Share of the variance of a list that its modes have together, and how many there are at most.
 const SHARE_OF_LIST: f64 = 0.999;
@@ -57,7 +56,7 @@ struct Mode {
 struct Moved {
     /// Place of the effect.
     effect: usize,
-    pointer: String,
+    parameter: String,
     by: f64,
 }
 
@@ -139,28 +138,20 @@ impl OpenEffects {
         let mut off: BTreeMap<(usize, &str), f64> = BTreeMap::new();
         for (mode, value) in self.modes.iter().zip(values) {
             for moved in &mode.moves {
-                *off.entry((moved.effect, &moved.pointer)).or_default() += value * moved.by;
+                *off.entry((moved.effect, &moved.parameter)).or_default() += value * moved.by;
             }
         }
-        let unmoved = |error: serde_json::Error| Failure::Internal(format!("an effect that is moved: {error}"));
         let mut effects = stated.to_vec();
         for (place, effect) in effects.iter_mut().enumerate() {
-            let own = off.range((place, "")..(place + 1, ""));
-            let mut fields: Option<Value> = None;
-            for ((_, pointer), by) in own {
-                let fields = match &mut fields {
-                    Some(fields) => fields,
-                    None => fields.insert(serde_json::to_value(&*effect).map_err(unmoved)?),
-                };
-                if let Some(field) = fields.pointer_mut(pointer) {
-                    let moved = field.as_f64().unwrap_or(0.0) + by;
-                    let range = effect.parameter(&pointer[1..]);
-                    *field = range.map_or(moved, |range| moved.clamp(range.lower, range.upper)).into();
-                }
+            let mut own = off.range((place, "")..(place + 1, "")).peekable();
+            if own.peek().is_none() {
+                continue;
             }
-            if let Some(fields) = fields {
-                *effect = serde_json::from_value(fields).map_err(unmoved)?;
-            }
+            let within = |path: &str, value: f64| {
+                effect.parameter(path).map_or(value, |range| value.clamp(range.lower, range.upper))
+            };
+            let changes = own.map(|(&(_, path), &by)| (path, move |value: f64| within(path, value + by)));
+            *effect = with_changed(&*effect, changes)?;
         }
         Ok(Some(effects))
     }
@@ -201,7 +192,7 @@ pub(crate) fn effect_of(quantity: &str) -> Option<&str> {
 /// The modes of a quantity with their unit rows: one of a single parameter, the principal axes of a list.
 fn modes_of(rows: &[Row]) -> Vec<(Vec<Moved>, DVector<f64>)> {
     let by = |row: &Row| DVector::from_column_slice(&row.by);
-    let moved = |row: &Row, by: f64| Moved { effect: row.effect, pointer: format!("/{}", row.parameter), by };
+    let moved = |row: &Row, by: f64| Moved { effect: row.effect, parameter: row.parameter.clone(), by };
     if let [row] = rows {
         let deviation = by(row).norm();
         return vec![(vec![moved(row, deviation)], by(row) / deviation)];

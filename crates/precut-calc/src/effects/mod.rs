@@ -20,7 +20,7 @@ pub use machinability::{
     CAUSES as MACHINABILITY_CAUSES, FactorLevel, MachinabilityConditions, MachinabilityEffect, RemainderPoint,
 };
 pub use milling::{CAUSES as MILLING_CAUSES, MillingEffect};
-pub(crate) use open::{Catalogued, has_parameter};
+pub(crate) use open::{Catalogued, has_parameter, with_changed};
 pub use open::{JointUncertainty, ParameterMove};
 pub(crate) use ring::whole;
 pub use ring::{CAUSES as RING_CAUSES, RingConditions, RingEffect};

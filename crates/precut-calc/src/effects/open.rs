@@ -1,7 +1,9 @@
 //! What is not known of effects: directions in which their numbers are off together.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use utoipa::ToSchema;
+
+use crate::calculator::Failure;
 
 use super::{Cause, Fit, Parameter};
 
@@ -69,6 +71,22 @@ impl Catalogued for super::RingEffect {
     fn entry(&self) -> &'static Cause {
         self.cause()
     }
+}
+
+/// An effect with some of its numbers changed: the path of each, and what becomes of it. What it does not have stays away.
+pub(crate) fn with_changed<'p, E, F>(effect: &E, changes: impl Iterator<Item = (&'p str, F)>) -> Result<E, Failure>
+where
+    E: Serialize + DeserializeOwned,
+    F: FnOnce(f64) -> f64,
+{
+    let unchanged = |error: serde_json::Error| Failure::Internal(format!("an effect that is changed: {error}"));
+    let mut fields = serde_json::to_value(effect).map_err(unchanged)?;
+    for (path, becomes) in changes {
+        if let Some(field) = fields.pointer_mut(&format!("/{path}")) {
+            *field = becomes(field.as_f64().unwrap_or(0.0)).into();
+        }
+    }
+    serde_json::from_value(fields).map_err(unchanged)
 }
 
 /// Whether an effect has a number of that name.

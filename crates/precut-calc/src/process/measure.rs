@@ -53,7 +53,7 @@ pub(super) fn ranked<M: Watched>(
     }
     let points = last.measurements.iter().map(|row| (0, row.point())).collect();
     let rows = Rows { runs: vec![last.conditions.clone()], points };
-    let usual = M::next_runs(&job, &rows, Ranges(&[])).into_iter().map(|next| {
+    let usual = M::next_runs(&job, &rows, Ranges(&[]), monitor)?.into_iter().map(|next| {
         // A fresh edge has cut nothing; all others are conditions as they are called.
         let is_edge = M::path_m(&next.run) == Some(0.0) && M::path_m(&last.conditions) != Some(0.0);
         (if is_edge { "new_edge" } else { "other_condition" }, next.changes, None, next.run)

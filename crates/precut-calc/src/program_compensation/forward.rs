@@ -8,7 +8,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed, checkpoint,
+    KnownOver, Missing, Monitor, NextRun, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed,
+    checkpoint,
 };
 use crate::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, GAUGE_STEP_MM, Measure,
@@ -320,14 +321,15 @@ impl Diagnosable for ProgramCompensation {
         _job: &Job,
         rows: &Rows<ProgramRun, DeflectionPoint>,
         _ranges: Ranges<'_>,
-    ) -> Vec<NextRun<ProgramRun, DeflectionPoint>> {
-        let Some(typical) = rows.runs.get(rows.runs.len() / 2) else { return Vec::new() };
+        _monitor: &dyn Monitor,
+    ) -> Result<NextRuns<ProgramRun, DeflectionPoint>, Failure> {
+        let Some(typical) = rows.runs.get(rows.runs.len() / 2) else { return Ok(Vec::new()) };
         let points = longest_run(rows);
         let next = |changes, run| NextRun { changes, run, points: points.clone() };
-        vec![
+        Ok(vec![
             next("tool_path_at_start_m", ProgramRun { tool_path_at_start_m: Some(0.0), ..typical.clone() }),
             next("warm_time_at_start_min", ProgramRun { warm_time_at_start_min: Some(0.0), ..typical.clone() }),
-        ]
+        ])
     }
 
     fn predict_ms(job: &Job) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, KnownOver, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, ToldEffects,
+    JacobianColumn, KnownOver, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows, ToldEffects,
     Unnamed, checkpoint, values_by_name, values_of_formula,
 };
 use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect, ErrorPoint, JointUncertainty};
@@ -273,8 +273,9 @@ impl Diagnosable for DeflectionCompensation {
         job: &Job,
         rows: &Rows<DeflectionRun, DeflectionPoint>,
         ranges: Ranges<'_>,
-    ) -> Vec<NextRun<DeflectionRun, DeflectionPoint>> {
-        next_runs(job, rows, ranges)
+        _monitor: &dyn Monitor,
+    ) -> Result<NextRuns<DeflectionRun, DeflectionPoint>, Failure> {
+        Ok(next_runs(job, rows, ranges))
     }
 }
 

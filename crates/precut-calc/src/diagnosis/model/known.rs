@@ -10,7 +10,7 @@ use crate::calculator::{Failure, Prediction};
 use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::Belief;
 use crate::diagnosis::verdict::weigh::Weighing;
-use crate::effects::{JointUncertainty, ParameterMove};
+use crate::effects::{JointUncertainty, ParameterMove, with_changed};
 
 /// The field that is the same a turn further.
 const PHASE: &str = "phase_rad";
@@ -35,16 +35,11 @@ impl<E> Default for Known<E> {
 impl<E: Serialize + DeserializeOwned> Known<E> {
     /// The effects, off by so many standard deviations of one entry.
     fn off_by(&self, entry: &JointUncertainty, deviations: f64) -> Result<Vec<E>, Failure> {
-        let unmoved = |error: serde_json::Error| Failure::Internal(format!("an effect that is moved: {error}"));
-        let mut fields: Vec<Value> =
-            self.effects.iter().map(serde_json::to_value).collect::<Result<_, _>>().map_err(unmoved)?;
-        for ParameterMove { effect, parameter, by } in &entry.moves {
-            let own = (*effect as usize).checked_sub(1).and_then(|index| fields.get_mut(index));
-            if let Some(field) = own.and_then(|fields| fields.pointer_mut(&format!("/{parameter}"))) {
-                *field = Value::from(field.as_f64().unwrap_or(0.0) + deviations * by);
-            }
-        }
-        fields.into_iter().map(serde_json::from_value).collect::<Result<_, _>>().map_err(unmoved)
+        let moved = |(place, effect): (usize, &E)| {
+            let own = entry.moves.iter().filter(|own| own.place() == Some(place));
+            with_changed(effect, own.map(|own| (own.parameter.as_str(), |value: f64| value + deviations * own.by)))
+        };
+        self.effects.iter().enumerate().map(moved).collect()
     }
 
     /// What one standard deviation of every entry does to what is predicted with the effects.

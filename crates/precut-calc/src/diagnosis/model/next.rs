@@ -87,7 +87,7 @@ pub(in crate::diagnosis) fn next_measurement<M: Diagnosable>(
     };
     let separation_now = now.separation(&other);
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
-    let runs = M::next_runs_watched(&job.job, rows, Ranges(&job.options.ranges), monitor)?;
+    let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges), monitor)?;
     let candidates = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
     let Some(best) = cheapest(&candidates).cloned() else { return Ok(None) };
     let further = if best.settles.is_some() { planning.further(&runs, best.number, leader)? } else { Vec::new() };

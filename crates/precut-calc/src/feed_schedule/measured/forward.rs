@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses,
-    Hypothesis, JacobianColumn, KnownOver, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    Unnamed, checkpoint,
+    Hypothesis, JacobianColumn, KnownOver, Missing, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges,
+    Rows, Unnamed, checkpoint,
 };
 use crate::effects::{
     Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
@@ -279,10 +279,11 @@ impl Diagnosable for FeedSchedule {
         job: &Job,
         rows: &Rows<MachinabilityRun, MachinabilityPoint>,
         ranges: Ranges<'_>,
-    ) -> Vec<NextRun<MachinabilityRun, MachinabilityPoint>> {
+        _monitor: &dyn Monitor,
+    ) -> Result<NextRuns<MachinabilityRun, MachinabilityPoint>, Failure> {
         let cuts: Vec<Row> =
             rows.points.iter().filter_map(|(run, point)| row(job, rows.runs.get(*run)?, point).ok()).collect();
-        next_runs(&cuts, ranges)
+        Ok(next_runs(&cuts, ranges))
     }
 
     fn consequences(

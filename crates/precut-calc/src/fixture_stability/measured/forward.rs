@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel,
-    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows,
     checkpoint,
 };
 use crate::effects::{Cause, FIXTURE_CAUSES, FixtureEffect, JointUncertainty};
@@ -311,8 +311,9 @@ impl Diagnosable for FixtureStability {
         job: &FixtureJob,
         rows: &Rows<FixtureRun, FixturePoint>,
         ranges: Ranges<'_>,
-    ) -> Vec<NextRun<FixtureRun, FixturePoint>> {
-        next_runs(job, rows, ranges)
+        _monitor: &dyn Monitor,
+    ) -> Result<NextRuns<FixtureRun, FixturePoint>, Failure> {
+        Ok(next_runs(job, rows, ranges))
     }
 
     fn consequences(

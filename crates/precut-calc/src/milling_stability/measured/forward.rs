@@ -5,8 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel,
-    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows,
-    Unwatched,
+    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows,
 };
 use crate::effects::{Cause, MILLING_CAUSES, MillingEffect};
 
@@ -252,16 +251,8 @@ impl Diagnosable for MillingStability {
         job: &Job,
         rows: &Rows<MillingRun, MillingPoint>,
         ranges: Ranges<'_>,
-    ) -> Vec<NextRun<MillingRun, MillingPoint>> {
-        next_runs(job, rows, ranges, &Unwatched).unwrap_or_default()
-    }
-
-    fn next_runs_watched(
-        job: &Job,
-        rows: &Rows<MillingRun, MillingPoint>,
-        ranges: Ranges<'_>,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<NextRun<MillingRun, MillingPoint>>, Failure> {
+    ) -> Result<NextRuns<MillingRun, MillingPoint>, Failure> {
         next_runs(job, rows, ranges, monitor)
     }
 

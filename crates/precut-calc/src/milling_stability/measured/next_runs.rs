@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::calculator::{Failure, Monitor, NextRun, Ranges, Rows};
+use crate::calculator::{Failure, Monitor, NextRun, NextRuns, Ranges, Rows};
 
 use super::super::job::{Case, Job, fits};
 use super::super::model::{Mode, Orders};
@@ -25,7 +25,7 @@ pub(super) fn next_runs(
     rows: &Rows<MillingRun, MillingPoint>,
     ranges: Ranges<'_>,
     monitor: &dyn Monitor,
-) -> Result<Vec<NextRun<MillingRun, MillingPoint>>, Failure> {
+) -> Result<NextRuns<MillingRun, MillingPoint>, Failure> {
     let (_, fitted) = fits(job, monitor)?;
     let Some(base) = Case::of(&fitted) else { return Ok(Vec::new()) };
     let run_of = |run: usize| rows.runs.get(run).cloned().unwrap_or_default();

@@ -171,7 +171,7 @@ impl Judged<'_> {
         let mut cut = 0.0;
         let all = (1 + 2 * count + count * count.saturating_sub(1) / 2) as f64;
         Surface::of(&vec![true; count], &mut |x| {
-            // What is not known of effects comes in standard deviations.
+            // Effects are off by multiples of their standard deviation.
             let value = |(place, x): (usize, &f64)| {
                 self.of.of.get(place).map_or(*x, |one| value_at(one.quantity, &one.distribution, *x))
             };

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     Check, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
-    JacobianColumn, Missing, Monitor, NextRun, Prediction, PrepareError, Quantity, Ranges, Rows, Violations,
+    JacobianColumn, Missing, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows, Violations,
     checkpoint,
 };
 use crate::effects::{Cause, JointUncertainty, RING_CAUSES, RingEffect};
@@ -311,8 +311,13 @@ impl Diagnosable for RingRoundness {
         vec![("angle_deg", Some(point.angle_deg))]
     }
 
-    fn next_runs(job: &Job, rows: &Rows<RingRun, RingPoint>, ranges: Ranges<'_>) -> Vec<NextRun<RingRun, RingPoint>> {
-        next_runs(job, rows, ranges)
+    fn next_runs(
+        job: &Job,
+        rows: &Rows<RingRun, RingPoint>,
+        ranges: Ranges<'_>,
+        _monitor: &dyn Monitor,
+    ) -> Result<NextRuns<RingRun, RingPoint>, Failure> {
+        Ok(next_runs(job, rows, ranges))
     }
 
     fn expansions(_prepared: &PreparedRing, hypothesis: &Hypothesis) -> Expansions {
