@@ -3,7 +3,7 @@
 use crate::calculator::{Failure, Monitor, checkpoint};
 use crate::diagnosis::causes::optima::{Optimum, elsewhere};
 use crate::diagnosis::causes::refine::{Fit, Refinement, Start};
-use crate::diagnosis::causes::search::{Candidate, Linear, by_weight};
+use crate::diagnosis::causes::search::{Beside, Candidate, Linear, by_weight};
 use crate::diagnosis::causes::subject::Setting;
 use crate::diagnosis::statistics::discrepancy::{self, Kind, Remainder};
 use crate::diagnosis::statistics::evidence::Side;
@@ -114,6 +114,64 @@ impl Ranking {
         self.refine_these(pairs, linear, refinement, monitor)
     }
 
+    /// Refines so many pairs at most that explain most where one of both is taken about its own fit: where the model is far from
+    /// linear, what is left beside a cause about the base is not what it leaves. Where a refinement falls short of what that
+    /// foretells, it begins from there once more.
+    pub(in crate::diagnosis) fn refine_beside_fits(
+        &mut self,
+        linear: &Linear<'_>,
+        refinement: &Refinement<'_>,
+        count: usize,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let mut pairs: Vec<(f64, usize, Start)> = Vec::new();
+        for (index, pair) in self.candidates.iter().enumerate().filter(|_| count > 0) {
+            checkpoint(monitor)?;
+            let [a, b] = pair.members[..] else { continue };
+            let of_both = [self.beside_fit(linear, a, b), self.beside_fit(linear, b, a)].into_iter().flatten();
+            let most = of_both.max_by(|a, b| a.0.total_cmp(&b.0));
+            pairs.extend(most.map(|(log_z, start)| (log_z, index, start)));
+        }
+        let weight = |pair: &(f64, usize, Start)| pair.0 + self.candidates[pair.1].log_prior;
+        pairs.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.1.cmp(&b.1)));
+        pairs.truncate(count);
+        let indices = pairs.iter().map(|(_, index, _)| *index).collect();
+        let of_members =
+            |(log_z, index, start): (f64, usize, Start)| (self.candidates[index].members.clone(), log_z, start);
+        let foretold: Vec<_> = pairs.into_iter().map(of_members).collect();
+        self.refine_these(indices, linear, refinement, monitor)?;
+        for (members, log_z, start) in foretold {
+            checkpoint(monitor)?;
+            self.refine_again(&members, (log_z, start), refinement)?;
+        }
+        by_weight(&mut self.candidates);
+        Ok(())
+    }
+
+    /// Logarithm of the evidence of two causes where the first is taken about its fit, and where they begin to be refined.
+    fn beside_fit(&self, linear: &Linear<'_>, first: usize, second: usize) -> Option<(f64, Start)> {
+        let alone = self.candidates.iter().find(|candidate| candidate.members == [first])?;
+        let Beside { gain, start } = linear.beside(self.fit(&alone.members)?, second)?;
+        Some((alone.log_z + gain, start))
+    }
+
+    /// Refines a set from another start where it explains less than is foretold of that.
+    fn refine_again(
+        &mut self,
+        members: &[usize],
+        (foretold, start): (f64, Start),
+        refinement: &Refinement<'_>,
+    ) -> Result<(), Failure> {
+        let falls_short = |candidate: &&mut Candidate| candidate.members == members && candidate.log_z < foretold;
+        let candidate = self.candidates.iter_mut().find(falls_short);
+        let of_set = self.fits.iter_mut().find(|(of, _)| of == members).and_then(|(_, fit)| fit.as_mut());
+        let (Some(candidate), Some(fit)) = (candidate, of_set) else { return Ok(()) };
+        if let Some(again) = refinement.fit(start, fit.with_shapes)?.filter(|again| again.settled) {
+            take_if_better(candidate, fit, again);
+        }
+        Ok(())
+    }
+
     fn is_refined(&self, candidate: &Candidate) -> bool {
         self.fits.iter().any(|(of, _)| *of == candidate.members)
     }
@@ -180,10 +238,8 @@ impl Ranking {
             checkpoint(monitor)?;
             let own = self.fits.iter_mut().find(|(of, _)| *of == candidate.members);
             let Some(fit) = own.and_then(|(_, fit)| fit.as_mut()) else { continue };
-            let best = elsewhere(candidate, fit, linear, refinement)?.into_iter().next();
-            if let Some(best) = best.filter(|best| best.log_z > fit.log_z) {
-                candidate.log_z += best.log_z - fit.log_z;
-                *fit = best;
+            if let Some(best) = elsewhere(candidate, fit, linear, refinement)?.into_iter().next() {
+                take_if_better(candidate, fit, best);
             }
         }
         by_weight(&mut self.candidates);
@@ -263,6 +319,14 @@ impl Ranking {
             remainder,
             others,
         }
+    }
+}
+
+/// Another fit of a set in the place of its own, where it explains more.
+fn take_if_better(candidate: &mut Candidate, fit: &mut Fit, other: Fit) {
+    if other.log_z > fit.log_z {
+        candidate.log_z += other.log_z - fit.log_z;
+        *fit = other;
     }
 }
 

@@ -87,6 +87,16 @@ impl Fit {
         }
     }
 
+    /// The settings with these free values, in units of their priors, within their bounds.
+    pub(in crate::diagnosis) fn moved(&self, t: &[f64], hypotheses: &[Hypothesis]) -> Vec<Setting> {
+        let mut settings = self.settings.clone();
+        for ((&(member, variable), coordinate), t) in self.free.iter().zip(&self.coordinates).zip(t) {
+            let range = hypotheses[settings[member].hypothesis].variables[variable].range;
+            settings[member].values[variable] = coordinate.moved(*t, range);
+        }
+        settings
+    }
+
     /// The free values at other settings, in units of their priors.
     pub(in crate::diagnosis) fn coordinates_at(&self, settings: &[Setting]) -> Vec<f64> {
         let of = |(&(member, variable), coordinate): (&(usize, usize), &Coordinate)| {

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calculator::{Failure, Hypothesis, Monitor, Treatment, Variable, checkpoint};
 use crate::diagnosis::causes::optima::Peak;
-use crate::diagnosis::causes::refine::Start;
+use crate::diagnosis::causes::refine::{Fit, Start};
 use crate::diagnosis::causes::signatures::{Signatures, Variant};
 use crate::diagnosis::causes::subject::Setting;
 use crate::diagnosis::statistics::evidence::{Evidence, Normal, Side, log_sum_exp};
@@ -44,6 +44,14 @@ struct Found {
     /// Logarithm of the evidence times the share of the set's weight that this point has.
     weighed: f64,
     evidence: Evidence,
+}
+
+/// A cause beside another that was refined.
+pub(in crate::diagnosis) struct Beside {
+    /// By how much it raises the logarithm of the evidence; a mean over its grid.
+    pub(in crate::diagnosis) gain: f64,
+    /// Where both together begin to be refined.
+    pub(in crate::diagnosis) start: Start,
 }
 
 /// A set of causes and how well it explains the rows.
@@ -181,6 +189,37 @@ impl<'a> Linear<'a> {
             square += offsets.iter().map(|&p| self.gram[(o, p)]).sum::<f64>();
         }
         Normal { gram, right, square }.evidence(&sides, *scale, whitener.rows())
+    }
+
+    /// What a hypothesis explains beside a cause that was refined: linearised where it is linearised, that one about its fit.
+    pub(in crate::diagnosis) fn beside(&self, fit: &Fit, hypothesis: usize) -> Option<Beside> {
+        let evidence = |v: Option<usize>| {
+            let variant = v.map(|v| self.variant(hypothesis, v));
+            let own = variant.into_iter().flat_map(|variant| &variant.free);
+            let columns: Vec<&White> =
+                fit.columns.iter().chain(own.clone().map(|free| &self.white[free.column])).collect();
+            let sides: Vec<Side> = fit.sides.iter().copied().chain(own.map(|free| free.side)).collect();
+            let offset = variant.and_then(|variant| variant.offset);
+            let shifted = offset.map(|offset| fit.residual.minus(&self.white[offset]));
+            self.likelihood.evidence(&columns, shifted.as_ref().unwrap_or(&fit.residual), &sides)
+        };
+        let alone = evidence(None)?;
+        let weighed = |v: usize| {
+            let with = evidence(Some(v))?;
+            Some((with.log_z + self.log_share(hypothesis, v), v, with.t))
+        };
+        let all: Vec<_> = (0..self.variants(hypothesis).len()).filter_map(weighed).collect();
+        let gain = log_sum_exp(&all.iter().map(|tried| tried.0).collect::<Vec<_>>()) - alone.log_z;
+        let (_, v, t) = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (of_fit, own) = t.split_at_checked(fit.free.len())?;
+        let (members, variants) = ([hypothesis], [v]);
+        let about = self.variant(hypothesis, v).setting.clone();
+        let mut start = Start { settings: fit.moved(of_fit, self.hypotheses), about: fit.settings.clone() };
+        start.settings.extend(self.within_bounds(&members, &variants, self.values(&members, &variants, own)));
+        start.about.push(about);
+        start.settings.sort_by_key(|setting| setting.hypothesis);
+        start.about.sort_by_key(|setting| setting.hypothesis);
+        Some(Beside { gain, start })
     }
 
     /// A set of causes: mean evidence over the product of the grids, and the best point.

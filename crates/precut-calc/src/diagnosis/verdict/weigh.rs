@@ -23,6 +23,8 @@ pub(in crate::diagnosis) const POSSIBLE: f64 = 0.1;
 const LEADING_SINGLES: usize = 6;
 const LEADING_PAIRS: usize = 6;
 const PAIRS_OF_WHOLE: usize = 20;
+/// Pairs that are refined beside those that lead from the base, see [`Effort::beside_fits`].
+const PAIRS_BESIDE_FITS: usize = 12;
 /// A set whose evidence is below that of the leader by no more than this may lead from another of its optima.
 const NEAR: f64 = 2.0;
 /// Sets that are refined about the model itself.
@@ -74,6 +76,8 @@ pub struct Effort {
     /// Of the sets of none, one, two and three causes those that are refined in any case: from the base a single cause
     /// of a model that is far from linear looks worse than a set that mimics it.
     pub of_each_size: [usize; 4],
+    /// Pairs that are refined since they explain most where one of both is taken about its own fit.
+    pub beside_fits: usize,
     /// How often those that lead only after others were refined are refined, too, and how many each time.
     pub rounds: usize,
     /// See `rounds`.
@@ -100,6 +104,7 @@ impl Effort {
             leading: [usize::MAX, PAIRS_OF_WHOLE],
             leaders: LEADERS,
             of_each_size: [0, usize::MAX, 0, 0],
+            beside_fits: 0,
             rounds: 1,
             late_leaders: LATE_LEADERS,
             nonlinear: false,
@@ -128,6 +133,7 @@ impl Effort {
             leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
             of_each_size: [0, usize::MAX, 3, 1],
+            beside_fits: PAIRS_BESIDE_FITS,
             rounds: 3,
             late_leaders: 2,
             nonlinear: true,
@@ -149,6 +155,7 @@ impl Effort {
             leading: [LEADING_SINGLES, LEADING_PAIRS],
             leaders: 1,
             of_each_size: [0, 2, 1, 0],
+            beside_fits: 0,
             rounds: 1,
             late_leaders: 1,
             nonlinear: true,
@@ -230,6 +237,7 @@ impl<'a> Weighing<'a> {
         if effort.other_optima == OtherOptima::OfAll {
             ranking.look_elsewhere_of(|set, _| set.members.len() == 1, &linear, &refinement, monitor)?;
         }
+        ranking.refine_beside_fits(&linear, &refinement, effort.beside_fits, monitor)?;
         for _ in 0..effort.rounds {
             ranking.refine(&linear, &refinement, effort.late_leaders, [0; 4], monitor)?;
         }
