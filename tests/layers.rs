@@ -89,9 +89,11 @@ fn the_compute_crates_depend_on_nothing_of_the_service() {
 #[test]
 fn each_folder_of_a_room_knows_those_before_it_alone() {
     let diagnosis: &[&[&str]] = &[&["rows"], &["statistics"], &["causes"], &["verdict"], &["model"], &["answer"]];
+    let process: &[&[&str]] = &[&["part"], &["change"], &["history"], &["answer"]];
     let calculator: &[&[&str]] = &[&["job", "model"], &["answer"], &["measured"]];
     for (room, order) in [
         ("diagnosis", diagnosis),
+        ("process", process),
         ("deflection_compensation", calculator),
         ("feed_schedule", calculator),
         ("fixture_stability", calculator),

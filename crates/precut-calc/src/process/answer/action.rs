@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::memory::Memory;
-use super::outlook::Expected;
-use super::sight::{GAUGE, Sighting};
-use super::state::{Action, ActionKind, Change, ChangeVerdict, ChangedCause, Decided, Forecast};
 use crate::calculator::Limits;
+use crate::process::answer::outlook::Expected;
+use crate::process::answer::output::{Action, ActionKind, Change, ChangeVerdict, ChangedCause, Decided, Forecast};
+use crate::process::history::memory::Memory;
+use crate::process::part::sight::{GAUGE, Sighting};
 
 /// A new path only where the mean deviation is this much larger than what is unsure of it, and than what a part scatters.
 const OVER_UNSURE: f64 = 1.5;
@@ -36,20 +36,20 @@ pub const ACTION_CODES: &[&str] = &[
 ];
 
 /// What is expected of the next part on the path in use and, where that leaves the dead band, on the path that was tried.
-pub(super) struct Expectation<'a> {
-    pub(super) now: &'a Expected,
-    pub(super) tried: Option<&'a Expected>,
+pub(in crate::process) struct Expectation<'a> {
+    pub(in crate::process) now: &'a Expected,
+    pub(in crate::process) tried: Option<&'a Expected>,
     /// One standard deviation of what parts scatter by themselves, a column each.
-    pub(super) scatter: &'a DMatrix<f64>,
+    pub(in crate::process) scatter: &'a DMatrix<f64>,
 }
 
 /// Whether a deviation is more than what is unsure of it, and than what parts scatter anyway.
-pub(super) fn is_beyond_dead_band(expected: &Expected, scatter: &DMatrix<f64>) -> bool {
+pub(in crate::process) fn is_beyond_dead_band(expected: &Expected, scatter: &DMatrix<f64>) -> bool {
     let square = expected.mean.norm_squared();
     square > OVER_UNSURE * expected.variance.sum() && square > OVER_SCATTER.powi(2) * scatter.norm_squared()
 }
 
-pub(super) fn of(
+pub(in crate::process) fn of(
     memory: &Memory,
     part: &Sighting,
     expected: &Expectation<'_>,

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use super::check::MOST_ROWS;
-use super::memory::Memory;
-use super::next::measured_over;
-use super::null::Gram;
-use super::sight::{COSINES, GAUGE};
-use super::state::{ChangedCause, Measure};
-use super::watch::{PartOf, Watch};
 use crate::calculator::{Calculator, Failure, Measurement, Monitor, Ranges, Rows, Watched};
+use crate::process::answer::next::measured_over;
+use crate::process::answer::output::{ChangedCause, Measure};
+use crate::process::change::null::Gram;
+use crate::process::history::memory::Memory;
+use crate::process::history::watch::Watch;
+use crate::process::part::check::MOST_ROWS;
+use crate::process::part::document::PartOf;
+use crate::process::part::sight::{COSINES, GAUGE};
 
 /// Standard uncertainty of a reading of a master, where none was stated, um.
 const MASTER_UM: f64 = 0.5;
@@ -17,7 +18,7 @@ const MASTER_UM: f64 = 0.5;
 const MOST: f64 = 1e6;
 
 /// Candidates by what one of them tells of the two likeliest causes of the last change, the best first.
-pub(super) fn ranked<M: Watched>(
+pub(in crate::process) fn ranked<M: Watched>(
     watch: &mut Watch<M>,
     last: &PartOf<M>,
     monitor: &dyn Monitor,
@@ -130,7 +131,7 @@ impl Memory {
     }
 
     /// Variant of a cause, and its size in prior standard deviations.
-    pub(super) fn place(&self, cause: &ChangedCause) -> Option<(usize, f64)> {
+    pub(in crate::process) fn place(&self, cause: &ChangedCause) -> Option<(usize, f64)> {
         let is_it = |variant: &usize| {
             let own = &self.catalogue.variants[*variant];
             let name = &self.catalogue.names[own.name];

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::null::{Column, Null, Source};
-use super::sight::{Catalogue, Sighting};
-use super::watch::Watch;
 use crate::calculator::{Calculator, Failure, Hypothesis, Measurement, Monitor, Over, Unnamed, Watched};
 use crate::diagnosis::{Bound, Setting, Subject, put};
 use crate::num::table::straight;
+use crate::process::change::null::{Column, Null, Source};
+use crate::process::history::watch::Watch;
+use crate::process::part::sight::{Catalogue, Sighting};
 
 /// Places along the part at which what no cause explains is given.
 const PLACES: usize = 33;
@@ -56,7 +56,7 @@ impl<M: Watched> Watch<M> {
     }
 
     /// The next part of this type and under these conditions, at places along all of it that is measured.
-    pub(super) fn ahead<'m>(
+    pub(in crate::process) fn ahead<'m>(
         &mut self,
         part_type: &str,
         conditions: &M::Run,
@@ -78,9 +78,9 @@ impl<M: Watched> Watch<M> {
 }
 
 /// A part that did not come yet, at places along it.
-pub(super) struct Ahead<'m, M: Watched> {
-    pub(super) part: Sighting,
-    pub(super) bound: Bound<'m, M>,
+pub(in crate::process) struct Ahead<'m, M: Watched> {
+    pub(in crate::process) part: Sighting,
+    pub(in crate::process) bound: Bound<'m, M>,
     /// The places, as shares of the length.
     at: Vec<f64>,
 }
@@ -88,7 +88,7 @@ pub(super) struct Ahead<'m, M: Watched> {
 impl<M: Watched> Ahead<'_, M> {
     /// The effects with which the calculator predicts what is wanted at the places: the causes at their sizes, and what is left
     /// without a name.
-    pub(super) fn effects(
+    pub(in crate::process) fn effects(
         &self,
         sizes: &[(usize, f64)],
         catalogue: &Catalogue,
@@ -100,13 +100,17 @@ impl<M: Watched> Ahead<'_, M> {
     }
 
     /// The effects of the base and those of the causes at their sizes.
-    pub(super) fn acting(&self, sizes: &[(usize, f64)], catalogue: &Catalogue) -> Result<Vec<M::Effect>, Failure> {
+    pub(in crate::process) fn acting(
+        &self,
+        sizes: &[(usize, f64)],
+        catalogue: &Catalogue,
+    ) -> Result<Vec<M::Effect>, Failure> {
         self.bound.with_settings(&settings(&self.bound, sizes, catalogue))
     }
 }
 
 /// Sizes of causes in a part, in the units of their fields, where so much of each column acts; of the columns that are chosen.
-pub(super) fn sizes(
+pub(in crate::process) fn sizes(
     catalogue: &Catalogue,
     null: &Null,
     amounts: &DVector<f64>,
@@ -124,7 +128,10 @@ pub(super) fn sizes(
 }
 
 /// From where to where a part is measured, as shares of its length.
-pub(super) fn measured_over<M: Watched>(job: &<M as Calculator>::Input, rows: &[M::Row]) -> Option<[f64; 2]> {
+pub(in crate::process) fn measured_over<M: Watched>(
+    job: &<M as Calculator>::Input,
+    rows: &[M::Row],
+) -> Option<[f64; 2]> {
     let place = |point: &M::Point| M::place(point).first().and_then(|(_, place)| *place);
     let (from, to) = (place(&M::point_along(job, 0.0))?, place(&M::point_along(job, 1.0))?);
     let shares =

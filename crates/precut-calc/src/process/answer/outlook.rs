@@ -2,18 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::action;
-use super::measure;
-use super::memory::Memory;
-use super::null::{Column, Null, Source, Told};
-use super::onsets::{Entry, What};
-use super::report;
-use super::sight::{COSINES, Sighting};
-use super::state::{Forecast, Model, Outlook, PathForecast};
-use super::watch::{PartOf, Watch};
 use crate::calculator::{Failure, Limits, Monitor, Watched};
 use crate::diagnosis::log_sum_exp;
 use crate::num::stats::Resampler;
+use crate::process::answer::action;
+use crate::process::answer::measure;
+use crate::process::answer::output::{Forecast, Model, Outlook, PathForecast};
+use crate::process::change::null::{Column, Null, Source, Told};
+use crate::process::change::onsets::{Entry, What};
+use crate::process::change::report;
+use crate::process::history::memory::Memory;
+use crate::process::history::watch::Watch;
+use crate::process::part::document::PartOf;
+use crate::process::part::sight::{COSINES, Sighting};
 
 /// Profiles that are drawn.
 const DRAWS: usize = 4000;
@@ -21,10 +22,10 @@ const DRAWS: usize = 4000;
 const DRAWN: f64 = 1e-4;
 
 /// What the next part's mean deviation may be, at the rows of the last part.
-pub(super) struct Expected {
+pub(in crate::process) struct Expected {
     /// Mean over all hypotheses, and its variance without what a part scatters by itself.
-    pub(super) mean: DVector<f64>,
-    pub(super) variance: DVector<f64>,
+    pub(in crate::process) mean: DVector<f64>,
+    pub(in crate::process) variance: DVector<f64>,
     /// Independent standard deviations of what is free.
     free: DMatrix<f64>,
     /// With nothing changed.
@@ -40,9 +41,9 @@ struct Drawn {
 }
 
 /// The next part as it may be cut: of which type, under which conditions, on which path.
-pub(super) struct Coming<M: Watched> {
-    pub(super) part: PartOf<M>,
-    pub(super) sighting: Sighting,
+pub(in crate::process) struct Coming<M: Watched> {
+    pub(in crate::process) part: PartOf<M>,
+    pub(in crate::process) sighting: Sighting,
 }
 
 impl<M: Watched> Watch<M> {
@@ -109,7 +110,7 @@ impl<M: Watched> Watch<M> {
     }
 
     /// The next part with the rows of the last one of its type; nothing where none came.
-    pub(super) fn coming(
+    pub(in crate::process) fn coming(
         &mut self,
         part_type: &str,
         conditions: &M::Run,
@@ -172,7 +173,7 @@ impl Memory {
     }
 
     /// What parts scatter by themselves, one standard deviation a column, at the rows of a part.
-    pub(super) fn scattered(&self, part: &Sighting) -> DMatrix<f64> {
+    pub(in crate::process) fn scattered(&self, part: &Sighting) -> DMatrix<f64> {
         let factors = self.scatter.as_ref().map_or(&[][..], |scatter| &scatter.factors);
         let columns = part.signs.scatter.iter().zip(factors);
         let columns: Vec<DVector<f64>> =
@@ -181,12 +182,12 @@ impl Memory {
     }
 
     /// What the mean deviation of a part that did not come yet may be; nothing while the process is learned.
-    pub(super) fn expectation(&self, part: &Sighting) -> Option<Expected> {
+    pub(in crate::process) fn expectation(&self, part: &Sighting) -> Option<Expected> {
         self.with_null(|told, null| self.expected(part, told, null))
     }
 
     /// The same from what the parts tell.
-    pub(super) fn expected(&self, part: &Sighting, told: &[Told<'_>], null: &Null) -> Expected {
+    pub(in crate::process) fn expected(&self, part: &Sighting, told: &[Told<'_>], null: &Null) -> Expected {
         let (rows, number) = (part.value.len(), part.number);
         // The gauge moves readings, not parts.
         let is_of_gauge = |source: Source| self.catalogue.gauge().is_some_and(|own| source == Source::Cause(own));

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::account::Gain;
 use crate::calculator::Message;
+use crate::process::history::account::Gain;
 
 /// How the process stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

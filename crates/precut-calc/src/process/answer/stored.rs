@@ -3,12 +3,12 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::next::sizes;
-use super::null::{Null, Source};
-use super::verdict::NORMAL_95;
-use super::watch::Watch;
 use crate::calculator::{Failure, Monitor, Watched};
 use crate::diagnosis::{JointUncertainty, moves_between};
+use crate::process::answer::next::sizes;
+use crate::process::change::null::{Null, Source};
+use crate::process::change::verdict::NORMAL_95;
+use crate::process::history::watch::Watch;
 
 /// How far each open direction is followed, in standard deviations: small beside what bends, large beside what is rounded.
 const STEP: f64 = 0.01;

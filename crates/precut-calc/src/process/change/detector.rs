@@ -1,9 +1,9 @@
 //! When to say that something changed, and which parts are odd by themselves (`process/3.3`).
 
-use super::document::Options;
-use super::null::{Null, Told};
-use super::onsets::{Entry, Scale};
 use crate::diagnosis::log_sum_exp;
+use crate::process::change::null::{Null, Told};
+use crate::process::change::onsets::{Entry, Scale};
+use crate::process::part::document::Options;
 
 /// So many of the last parts may be odd by themselves.
 const SUSPECTS: usize = 6;
@@ -17,17 +17,17 @@ const LEAST_SHARE: f64 = 1.5;
 
 /// What the parts so far say.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Statistic {
+pub(in crate::process) struct Statistic {
     /// ln R.
-    pub(super) log_r: f64,
+    pub(in crate::process) log_r: f64,
     /// ln of R/(1 + eps E)/A: 0 is the alarm.
-    pub(super) log_evidence: f64,
+    pub(in crate::process) log_evidence: f64,
     /// Place among the parts of one that is odd by itself, the likeliest.
-    pub(super) odd: Option<usize>,
+    pub(in crate::process) odd: Option<usize>,
 }
 
 /// R over the onsets and causes, held against single odd parts.
-pub(super) fn statistic(
+pub(in crate::process) fn statistic(
     options: &Options,
     entries: &[Entry],
     parts: &[Told<'_>],

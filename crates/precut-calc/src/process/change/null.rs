@@ -5,28 +5,28 @@ use std::sync::OnceLock;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
-use super::scatter::Scatter;
-use super::sight::{COSINES, Catalogue, Sighting};
 use crate::diagnosis::Whitener;
+use crate::process::change::scatter::Scatter;
+use crate::process::part::sight::{COSINES, Catalogue, Sighting};
 
 /// Prior standard deviation of each cosine of the mean profile, um on the diameter.
 const PROFILE_UM: f64 = 10.0;
 /// A drift is as large as its cause's prior after so many parts.
-pub(super) const DRIFT_PARTS: f64 = 20.0;
+pub(in crate::process) const DRIFT_PARTS: f64 = 20.0;
 
 /// A column that is free in every part, with a standard normal size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Column {
-    pub(super) source: Source,
+pub(in crate::process) struct Column {
+    pub(in crate::process) source: Source,
     /// From which part on it acts, and whether it grows from there.
-    pub(super) since: Option<(u32, Form)>,
+    pub(in crate::process) since: Option<(u32, Form)>,
     /// Prior standard deviation, in units of its column.
-    pub(super) sd: f64,
+    pub(in crate::process) sd: f64,
 }
 
 /// What a column is of.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) enum Source {
+pub(in crate::process) enum Source {
     /// A cosine of the mean profile of one type of parts.
     Profile { kind: usize, order: usize },
     /// A cosine, whatever the part.
@@ -37,14 +37,14 @@ pub(super) enum Source {
 
 /// How something changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Form {
+pub(in crate::process) enum Form {
     Step,
     Drift,
 }
 
 impl Form {
     /// g: how much of a change since a part acts in a later one.
-    pub(super) fn of(self, number: u32, since: u32) -> f64 {
+    pub(in crate::process) fn of(self, number: u32, since: u32) -> f64 {
         match self {
             _ if number < since => 0.0,
             Self::Step => 1.0,
@@ -55,20 +55,20 @@ impl Form {
 
 impl Column {
     /// The mean profile of a type of parts.
-    pub(super) fn profile(kind: usize, per_um: f64) -> impl Iterator<Item = Self> {
+    pub(in crate::process) fn profile(kind: usize, per_um: f64) -> impl Iterator<Item = Self> {
         let of = move |order| Self { source: Source::Profile { kind, order }, since: None, sd: PROFILE_UM * per_um };
         (0..COSINES).map(of)
     }
 
     /// How much of its basic column acts in a part.
-    pub(super) fn weight(&self, kind: usize, number: u32) -> f64 {
+    pub(in crate::process) fn weight(&self, kind: usize, number: u32) -> f64 {
         let is_own = !matches!(self.source, Source::Profile { kind: own, .. } if own != kind);
         let acts = self.since.map_or(1.0, |(since, form)| form.of(number, since));
         if is_own { self.sd * acts } else { 0.0 }
     }
 
     /// Which of the basic columns it is.
-    pub(super) fn basic(&self) -> usize {
+    pub(in crate::process) fn basic(&self) -> usize {
         match self.source {
             Source::Profile { order, .. } | Source::Wave(order) => order,
             Source::Cause(variant) => COSINES + variant,
@@ -79,10 +79,10 @@ impl Column {
 /// Inner products of all basic columns of a part, whitened: cosines, variants of causes, and last what was measured beside the
 /// prediction.
 #[derive(Clone)]
-pub(super) struct Gram {
-    pub(super) inner: DMatrix<f64>,
+pub(in crate::process) struct Gram {
+    pub(in crate::process) inner: DMatrix<f64>,
     /// How many rows it stands for, with the readings of a master.
-    pub(super) rows: usize,
+    pub(in crate::process) rows: usize,
     /// B'B and B'r with the weights under which they were asked for first.
     free: OnceLock<OfFree>,
 }
@@ -96,16 +96,16 @@ struct OfFree {
 }
 
 impl Gram {
-    pub(super) fn new(inner: DMatrix<f64>, rows: usize) -> Self {
+    pub(in crate::process) fn new(inner: DMatrix<f64>, rows: usize) -> Self {
         Self { inner, rows, free: OnceLock::new() }
     }
 
     /// Something else is free: B'B is to be made anew. Where that is left out it is made at every sum.
-    pub(super) fn forget_free(&mut self) {
+    pub(in crate::process) fn forget_free(&mut self) {
         self.free = OnceLock::new();
     }
 
-    pub(super) fn of(part: &Sighting, scatter: &Scatter, catalogue: &Catalogue) -> Self {
+    pub(in crate::process) fn of(part: &Sighting, scatter: &Scatter, catalogue: &Catalogue) -> Self {
         let data = part.data();
         let whitener = Whitener::new(&data, &scatter.noise(), &part.scatter(&scatter.factors), &part.keep);
         let last = COSINES + catalogue.variants.len();
@@ -141,28 +141,28 @@ impl Gram {
         Self::new(inner, part.keep.iter().filter(|keep| **keep).count() + part.checks.len())
     }
 
-    pub(super) fn residual(&self) -> usize {
+    pub(in crate::process) fn residual(&self) -> usize {
         self.inner.nrows() - 1
     }
 }
 
 /// A part with what it tells.
-pub(super) struct Told<'a> {
-    pub(super) number: u32,
-    pub(super) ordinal: usize,
-    pub(super) gram: &'a Gram,
+pub(in crate::process) struct Told<'a> {
+    pub(in crate::process) number: u32,
+    pub(in crate::process) ordinal: usize,
+    pub(in crate::process) gram: &'a Gram,
     /// Weight and basic column of everything that is free.
-    pub(super) free: Vec<(f64, usize)>,
+    pub(in crate::process) free: Vec<(f64, usize)>,
 }
 
 impl<'a> Told<'a> {
-    pub(super) fn of(part: &Sighting, gram: &'a Gram, columns: &[Column]) -> Self {
+    pub(in crate::process) fn of(part: &Sighting, gram: &'a Gram, columns: &[Column]) -> Self {
         let free = columns.iter().map(|column| (column.weight(part.kind, part.number), column.basic())).collect();
         Self { number: part.number, ordinal: part.ordinal, gram, free }
     }
 
     /// B'c of a basic column c.
-    pub(super) fn along(&self, basic: usize) -> impl Iterator<Item = f64> + '_ {
+    pub(in crate::process) fn along(&self, basic: usize) -> impl Iterator<Item = f64> + '_ {
         self.free
             .iter()
             .map(move |&(weight, own)| if weight == 0.0 { 0.0 } else { weight * self.gram.inner[(own, basic)] })
@@ -201,19 +201,19 @@ impl<'a> Told<'a> {
 
 /// What parts that left the memory still tell: A and eta without the prior.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(try_from = "super::snapshot::Sums", into = "super::snapshot::Sums")]
-pub(super) struct Older {
-    pub(super) a: DMatrix<f64>,
-    pub(super) eta: DVector<f64>,
+#[serde(try_from = "Sums", into = "Sums")]
+pub(in crate::process) struct Older {
+    pub(in crate::process) a: DMatrix<f64>,
+    pub(in crate::process) eta: DVector<f64>,
 }
 
 impl Older {
-    pub(super) fn none() -> Self {
+    pub(in crate::process) fn none() -> Self {
         Self { a: DMatrix::zeros(0, 0), eta: DVector::zeros(0) }
     }
 
     /// With a part more, everything before it counting a little less.
-    pub(super) fn take(&mut self, part: &Told<'_>, memory: f64) {
+    pub(in crate::process) fn take(&mut self, part: &Told<'_>, memory: f64) {
         let count = part.free.len();
         let stays = 1.0 - 1.0 / memory;
         self.a = self.a.clone().resize(count, count, 0.0) * stays;
@@ -222,7 +222,7 @@ impl Older {
     }
 
     /// Without one column.
-    pub(super) fn without(&self, gone: &[bool]) -> Self {
+    pub(in crate::process) fn without(&self, gone: &[bool]) -> Self {
         let kept: Vec<usize> = (0..self.eta.len()).filter(|&k| !gone[k]).collect();
         Self {
             a: DMatrix::from_fn(kept.len(), kept.len(), |i, j| self.a[(kept[i], kept[j])]),
@@ -232,19 +232,23 @@ impl Older {
 }
 
 /// What is free, and what is known of it: A0 = I + sum B'B, eta = sum B'r.
-pub(super) struct Null {
-    pub(super) columns: Vec<Column>,
+pub(in crate::process) struct Null {
+    pub(in crate::process) columns: Vec<Column>,
     /// Of A0.
-    pub(super) factor: Cholesky<f64, Dyn>,
+    pub(in crate::process) factor: Cholesky<f64, Dyn>,
     /// L^-1: it is applied to all columns at every onset.
     inverse: DMatrix<f64>,
     /// L^-1 eta.
-    pub(super) half: DVector<f64>,
+    pub(in crate::process) half: DVector<f64>,
 }
 
 impl Null {
     /// From older parts and those in memory.
-    pub(super) fn of<'a>(columns: &[Column], older: &Older, parts: impl Iterator<Item = &'a Told<'a>>) -> Option<Self> {
+    pub(in crate::process) fn of<'a>(
+        columns: &[Column],
+        older: &Older,
+        parts: impl Iterator<Item = &'a Told<'a>>,
+    ) -> Option<Self> {
         let count = columns.len();
         let mut a = older.a.clone().resize(count, count, 0.0) + DMatrix::identity(count, count);
         let mut eta = older.eta.clone().resize_vertically(count, 0.0);
@@ -256,27 +260,27 @@ impl Null {
     }
 
     /// L^-1 c.
-    pub(super) fn halved(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(in crate::process) fn halved(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
         &self.inverse * c
     }
 
     /// Posterior mean of what is free.
-    pub(super) fn mean(&self) -> DVector<f64> {
+    pub(in crate::process) fn mean(&self) -> DVector<f64> {
         self.back(&self.half)
     }
 
     /// L'^-1 c.
-    pub(super) fn back(&self, c: &DVector<f64>) -> DVector<f64> {
+    pub(in crate::process) fn back(&self, c: &DVector<f64>) -> DVector<f64> {
         self.factor.l_dirty().tr_solve_lower_triangular(c).unwrap_or_else(|| c.clone())
     }
 
     /// What is free in a part, row by row, before it is whitened.
-    pub(super) fn rows_of(&self, part: &Sighting) -> Vec<Vec<f64>> {
+    pub(in crate::process) fn rows_of(&self, part: &Sighting) -> Vec<Vec<f64>> {
         self.columns.iter().map(|column| row_column(column, part)).collect()
     }
 
     /// The rows of a part as they are expected.
-    pub(super) fn expected_rows(&self, part: &Sighting) -> Vec<f64> {
+    pub(in crate::process) fn expected_rows(&self, part: &Sighting) -> Vec<f64> {
         let mut expected = part.signs.base.clone();
         for (size, column) in self.mean().iter().zip(self.rows_of(part)) {
             expected.iter_mut().zip(column).for_each(|(sum, x)| *sum += size * x);
@@ -286,7 +290,7 @@ impl Null {
 
     /// Mahalanobis distance of a part to its prediction from what is known here, the part itself not in it: chi2 with as many
     /// degrees as it has rows; and how far its mean, taper and bow lie, in standard deviations.
-    pub(super) fn distance(&self, part: &Told<'_>) -> Option<(f64, [f64; 3])> {
+    pub(in crate::process) fn distance(&self, part: &Told<'_>) -> Option<(f64, [f64; 3])> {
         let (last, count) = (part.gram.residual(), part.free.len());
         let mean = self.mean();
         let free = |basic: usize| DVector::from_iterator(count, part.along(basic));
@@ -319,4 +323,29 @@ fn row_column(column: &Column, part: &Sighting) -> Vec<f64> {
         Source::Cause(variant) => part.signs.causes.iter().find(|(own, _)| *own == variant).map(|(_, column)| column),
     };
     basic.map_or_else(|| vec![0.0; part.residual.len()], |column| column.iter().map(|x| weight * x).collect())
+}
+
+/// A symmetric matrix and a vector as they are kept.
+#[derive(Serialize, Deserialize)]
+struct Sums {
+    a: Vec<f64>,
+    eta: Vec<f64>,
+}
+
+impl From<Older> for Sums {
+    fn from(older: Older) -> Self {
+        Self { a: older.a.as_slice().to_vec(), eta: older.eta.as_slice().to_vec() }
+    }
+}
+
+impl TryFrom<Sums> for Older {
+    type Error = &'static str;
+
+    fn try_from(sums: Sums) -> Result<Self, Self::Error> {
+        let count = sums.eta.len();
+        if sums.a.len() != count * count {
+            return Err("a matrix that is not square");
+        }
+        Ok(Self { a: DMatrix::from_vec(count, count, sums.a), eta: DVector::from_vec(sums.eta) })
+    }
 }

@@ -2,14 +2,14 @@
 
 use nalgebra::DMatrix;
 
-use super::null::{Form, Null, Told};
-use super::sight::{COSINES, Catalogue};
-use super::sums::{Fit, Reach, Sums, Waves};
 use crate::diagnosis::{log_sum_exp, spread_of_cosines};
+use crate::process::change::null::{Form, Null, Told};
+use crate::process::change::sums::{Fit, Reach, Sums, Waves};
+use crate::process::part::sight::{COSINES, Catalogue};
 
 /// The last parts are all onsets; before them every fourth is, back to this many parts.
 const ALL: usize = 40;
-pub(super) const WINDOW: usize = 160;
+pub(in crate::process) const WINDOW: usize = 160;
 const EVERY: usize = 4;
 /// Shares of the names by a step and by a drift, and of what has no name.
 const STEPS: f64 = 0.65;
@@ -22,33 +22,33 @@ const SIZES: [f64; 3] = [1.0, 3.0, 10.0];
 const LENGTH: f64 = 0.08;
 
 /// What is weighed over onsets and causes.
-pub(super) struct Scale<'a> {
-    pub(super) catalogue: &'a Catalogue,
+pub(in crate::process) struct Scale<'a> {
+    pub(in crate::process) catalogue: &'a Catalogue,
     /// Standard deviation of a reading.
-    pub(super) sigma: f64,
+    pub(in crate::process) sigma: f64,
     /// Onsets that stand for several weigh as much as these.
-    pub(super) thinned_weigh: bool,
+    pub(in crate::process) thinned_weigh: bool,
 }
 
 /// A hypothesis with its evidence.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
+pub(in crate::process) struct Entry {
     /// The part since which it acts.
-    pub(super) since: u32,
-    pub(super) what: What,
-    pub(super) form: Form,
+    pub(in crate::process) since: u32,
+    pub(in crate::process) what: What,
+    pub(in crate::process) form: Form,
     /// ln of weight times Bayes factor.
-    pub(super) log_weight: f64,
+    pub(in crate::process) log_weight: f64,
     /// Posterior mean and variance of the size of a cause, in prior standard deviations of its variant.
-    pub(super) mean: f64,
-    pub(super) variance: f64,
+    pub(in crate::process) mean: f64,
+    pub(in crate::process) variance: f64,
     /// Of cosines all of them.
-    pub(super) waves: Option<Box<Waves>>,
+    pub(in crate::process) waves: Option<Box<Waves>>,
 }
 
 /// What a hypothesis is about.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum What {
+pub(in crate::process) enum What {
     /// A variant of a cause.
     Cause(usize),
     /// All cosines, of one of [`SIZES`].
@@ -56,17 +56,17 @@ pub(super) enum What {
 }
 
 /// Who is told of hypotheses.
-pub(super) type Hear<'h> = &'h mut dyn FnMut(Entry, &DMatrix<f64>);
+pub(in crate::process) type Hear<'h> = &'h mut dyn FnMut(Entry, &DMatrix<f64>);
 
 impl Scale<'_> {
     /// Prior standard deviations of the cosines of something without a name.
-    pub(super) fn waves(&self, size: usize) -> Vec<f64> {
+    pub(in crate::process) fn waves(&self, size: usize) -> Vec<f64> {
         spread_of_cosines(COSINES, LENGTH, SIZES[size] * self.sigma)
     }
 
     /// Everything that may have changed since the parts from `first` on; `hear` is given each hypothesis with L^-1 c of all
     /// basic columns.
-    pub(super) fn each(&self, parts: &[Told<'_>], null: &Null, first: u32, hear: Hear<'_>) {
+    pub(in crate::process) fn each(&self, parts: &[Told<'_>], null: &Null, first: u32, hear: Hear<'_>) {
         let Some(newest) = parts.last() else { return };
         let basic = newest.gram.residual();
         let tried = Tried::of(self);
@@ -103,14 +103,14 @@ impl Scale<'_> {
     }
 
     /// All of it.
-    pub(super) fn entries(&self, parts: &[Told<'_>], null: &Null, first: u32) -> Vec<Entry> {
+    pub(in crate::process) fn entries(&self, parts: &[Told<'_>], null: &Null, first: u32) -> Vec<Entry> {
         let mut entries = Vec::new();
         self.each(parts, null, first, &mut |entry, _| entries.push(entry));
         entries
     }
 
     /// ln of the Bayes factor of "this part alone is off", of each of some parts: by any cause, half the weight, or by cosines.
-    pub(super) fn log_alone(&self, parts: &[Told<'_>], null: &Null) -> Vec<f64> {
+    pub(in crate::process) fn log_alone(&self, parts: &[Told<'_>], null: &Null) -> Vec<f64> {
         let tried = Tried::of(self);
         let count = parts.last().map_or(0, |part| part.gram.residual());
         let alone = |part: &Told<'_>| {
@@ -195,7 +195,7 @@ impl Tried {
 impl Entry {
     /// Posterior mean and variance of its size: of a cause in prior standard deviations of its variant, of cosines root mean
     /// square along the part, in the unit of the quantity.
-    pub(super) fn size(&self) -> (f64, f64) {
+    pub(in crate::process) fn size(&self) -> (f64, f64) {
         self.waves.as_ref().map_or((self.mean, self.variance), |waves| waves.rms())
     }
 }

@@ -1,12 +1,14 @@
 //! Changes and states in the words of the contract (`process/4`).
 
-use super::document::Options;
-use super::null::{Column, Form, Source};
-use super::onsets::What;
-use super::sight::Catalogue;
-use super::state::{Change, ChangeForm, ChangeVerdict, ChangedCause, ModelSize, Situation, State, Unused};
-use super::verdict::{Class, Judgement, NORMAL_95, Suspect};
 use crate::calculator::Message;
+use crate::process::answer::output::{
+    Change, ChangeForm, ChangeVerdict, ChangedCause, ModelSize, Situation, State, Unused,
+};
+use crate::process::change::null::{Column, Form, Source};
+use crate::process::change::onsets::What;
+use crate::process::change::verdict::{Class, Judgement, NORMAL_95, Suspect};
+use crate::process::part::document::Options;
+use crate::process::part::sight::Catalogue;
 
 /// Everything that a state may say.
 pub const EXPLANATION_CODES: &[&str] = &[
@@ -24,7 +26,13 @@ pub const EXPLANATION_CODES: &[&str] = &[
 ];
 
 /// A change as it is told.
-pub(super) fn change(id: &str, reported: u32, accepted: bool, judgement: &Judgement, catalogue: &Catalogue) -> Change {
+pub(in crate::process) fn change(
+    id: &str,
+    reported: u32,
+    accepted: bool,
+    judgement: &Judgement,
+    catalogue: &Catalogue,
+) -> Change {
     Change {
         id: id.to_owned(),
         verdict: match judgement.class {
@@ -68,7 +76,12 @@ fn cause(suspect: &Suspect, catalogue: &Catalogue) -> ChangedCause {
 }
 
 /// A size of the model, of a free column at so many of its standard deviations; nothing of what is no cause.
-pub(super) fn model_size(catalogue: &Catalogue, column: &Column, mean: f64, deviation: f64) -> Option<ModelSize> {
+pub(in crate::process) fn model_size(
+    catalogue: &Catalogue,
+    column: &Column,
+    mean: f64,
+    deviation: f64,
+) -> Option<ModelSize> {
     let Source::Cause(variant) = column.source else { return None };
     let own = &catalogue.variants[variant];
     let name = &catalogue.names[own.name];
@@ -94,7 +107,7 @@ fn form_of(form: Form) -> ChangeForm {
 }
 
 /// What there is to say of a state, most important first.
-pub(super) fn explanation(state: &State, options: &Options) -> Vec<Message> {
+pub(in crate::process) fn explanation(state: &State, options: &Options) -> Vec<Message> {
     let number = f64::from(state.number);
     let mut said = Vec::new();
     if let Some(unused) = state.unused {

@@ -3,10 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::null::Null;
-use super::sight::Sighting;
 use crate::calculator::{Design, Smooth};
 use crate::diagnosis::{Data, Layout, Noise, NoiseSource, Whitener};
+use crate::process::change::null::Null;
+use crate::process::part::sight::Sighting;
 
 /// Correlations from row to row that are tried.
 const CORRELATIONS: [f64; 5] = [0.0, 0.1, 0.2, 0.3, 0.45];
@@ -20,18 +20,18 @@ const REACH: f64 = 3.0;
 
 /// Scatter of readings and of parts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Scatter {
+pub(in crate::process) struct Scatter {
     /// Standard deviation of a reading, in the unit of the quantity.
-    pub(super) sigma: f64,
+    pub(in crate::process) sigma: f64,
     /// Correlation from one row of a sweep to the next.
-    pub(super) rho: f64,
+    pub(in crate::process) rho: f64,
     /// Each allowance of a part relative to what was stated.
-    pub(super) factors: Vec<f64>,
+    pub(in crate::process) factors: Vec<f64>,
 }
 
 impl Scatter {
     /// As it is stated, or as the smooth parts of the rows leave it.
-    pub(super) fn first(parts: &[Sighting], stated: Option<f64>) -> Self {
+    pub(in crate::process) fn first(parts: &[Sighting], stated: Option<f64>) -> Self {
         let factors = vec![1.0; parts.first().map_or(0, |part| part.signs.scatter.len())];
         let rows: usize = parts.iter().map(|part| part.value.len()).sum();
         let mut data = Data { value: Vec::with_capacity(rows), uncertainty: None, sides: None, layout: empty_layout() };
@@ -53,7 +53,7 @@ impl Scatter {
         Self { sigma: stated.unwrap_or(noise.sigma), rho: noise.rho, factors }
     }
 
-    pub(super) fn noise(&self) -> Noise {
+    pub(in crate::process) fn noise(&self) -> Noise {
         let source = NoiseSource::Profile;
         Noise { sigma: self.sigma, per_row: None, rho: self.rho, dof: f64::INFINITY, source }
     }
@@ -62,7 +62,7 @@ impl Scatter {
     ///
     /// A part by itself says little of the correlation between neighbours, as its smooth part is its own; parts of one mean
     /// profile say much.
-    pub(super) fn learned(&self, parts: &[Sighting], null: &Null, stated: Option<f64>) -> Self {
+    pub(in crate::process) fn learned(&self, parts: &[Sighting], null: &Null, stated: Option<f64>) -> Self {
         let with = |rho: f64| {
             let told: Vec<Told> = parts.iter().map(|part| Told::of(part, null, rho)).collect();
             let own = Self { rho, ..self.clone() }.most_likely(&told, null, stated);

@@ -3,11 +3,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::function::erf::erfc;
 
-use super::null::{DRIFT_PARTS, Form, Null, Told};
-use super::sight::COSINES;
+use crate::process::change::null::{DRIFT_PARTS, Form, Null, Told};
+use crate::process::part::sight::COSINES;
 
 /// G, b and c of every basic column over the parts since an onset, for a step and for a drift; of the cosines all products.
-pub(super) struct Sums {
+pub(in crate::process) struct Sums {
     /// X'X of every column alone: times 1, times n - tau, and times its square.
     square: [Vec<f64>; 3],
     /// X'r: times 1, and times n - tau.
@@ -20,12 +20,12 @@ pub(super) struct Sums {
 
 /// One column on some parts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fit {
+pub(in crate::process) struct Fit {
     /// ln BF.
-    pub(super) log_bf: f64,
+    pub(in crate::process) log_bf: f64,
     /// Size in prior standard deviations at scale 1: its posterior mean.
-    pub(super) mean: f64,
-    pub(super) variance: f64,
+    pub(in crate::process) mean: f64,
+    pub(in crate::process) variance: f64,
 }
 
 /// Beyond so many standard deviations a bound is no bound.
@@ -33,7 +33,7 @@ const FAR: f64 = 6.0;
 
 /// Where the size of a cause cannot leave a range.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Reach {
+pub(in crate::process) enum Reach {
     Free,
     /// Between these ends, where the prior has ln P(within) of its own.
     Bounded {
@@ -45,7 +45,7 @@ pub(super) enum Reach {
 
 impl Reach {
     /// `scale` is the standard deviation of the prior.
-    pub(super) fn of(scale: f64, [least, most]: [f64; 2]) -> Self {
+    pub(in crate::process) fn of(scale: f64, [least, most]: [f64; 2]) -> Self {
         if least < -FAR * scale && most > FAR * scale {
             return Self::Free;
         }
@@ -55,7 +55,7 @@ impl Reach {
 
 impl Fit {
     /// The same where the size cannot leave a range: both densities are cut off there.
-    pub(super) fn within(self, reach: &Reach) -> Self {
+    pub(in crate::process) fn within(self, reach: &Reach) -> Self {
         let &Reach::Bounded { least, most, log_before } = reach else { return self };
         let deviation = self.variance.sqrt();
         let [a, b] = [least, most].map(|end| (end - self.mean) / deviation);
@@ -95,7 +95,7 @@ fn upper_tail(x: f64) -> f64 {
 }
 
 impl Sums {
-    pub(super) fn none(free: usize, basic: usize) -> Self {
+    pub(in crate::process) fn none(free: usize, basic: usize) -> Self {
         let zeros = || vec![0.0; basic];
         Self {
             square: [zeros(), zeros(), zeros()],
@@ -106,7 +106,7 @@ impl Sums {
     }
 
     /// The onset moves so many parts back: (k + d)^2 = k^2 + 2 d k + d^2.
-    pub(super) fn earlier(&mut self, by: f64) {
+    pub(in crate::process) fn earlier(&mut self, by: f64) {
         let [one, first, second] = &mut self.square;
         for ((second, first), one) in second.iter_mut().zip(first.iter_mut()).zip(one.iter()) {
             *second += by * (2.0 * *first + by * one);
@@ -119,7 +119,7 @@ impl Sums {
     }
 
     /// A part with which it begins.
-    pub(super) fn begin_with(&mut self, part: &Told<'_>) {
+    pub(in crate::process) fn begin_with(&mut self, part: &Told<'_>) {
         let (inner, last) = (&part.gram.inner, part.gram.residual());
         for basic in 0..last {
             self.square[0][basic] += inner[(basic, basic)];
@@ -137,7 +137,7 @@ impl Sums {
     }
 
     /// L^-1 c of every basic column.
-    pub(super) fn halved(&self, form: Form, null: &Null) -> DMatrix<f64> {
+    pub(in crate::process) fn halved(&self, form: Form, null: &Null) -> DMatrix<f64> {
         match form {
             Form::Step => null.halved(&self.free[0].transpose()),
             Form::Drift => null.halved(&((&self.free[0] + &self.free[1]).transpose() / DRIFT_PARTS)),
@@ -145,7 +145,14 @@ impl Sums {
     }
 
     /// ln BF = -1/2 ln(1 + s^2 G*) + 1/2 s^2 b*^2/(1 + s^2 G*), of one column of prior standard deviation s.
-    pub(super) fn one(&self, basic: usize, form: Form, scale: f64, halved: &DMatrix<f64>, null: &Null) -> Fit {
+    pub(in crate::process) fn one(
+        &self,
+        basic: usize,
+        form: Form,
+        scale: f64,
+        halved: &DMatrix<f64>,
+        null: &Null,
+    ) -> Fit {
         let (g, b) = match form {
             Form::Step => (self.square[0][basic], self.right[0][basic]),
             // A drift acts (n - tau + 1)/20: (k + 1)^2 = k^2 + 2 k + 1.
@@ -163,7 +170,7 @@ impl Sums {
     }
 
     /// G* and b* of all cosines.
-    pub(super) fn cosines(&self, halved: &DMatrix<f64>, null: &Null) -> Cosines {
+    pub(in crate::process) fn cosines(&self, halved: &DMatrix<f64>, null: &Null) -> Cosines {
         let own = halved.columns(0, COSINES);
         let g = &self.waves - own.tr_mul(&own);
         let b = DVector::from_column_slice(&self.right[0][..COSINES]) - own.tr_mul(&null.half);
@@ -172,14 +179,14 @@ impl Sums {
 }
 
 /// What parts since an onset tell of a step of all cosines, what is free taken out.
-pub(super) struct Cosines {
+pub(in crate::process) struct Cosines {
     g: DMatrix<f64>,
     b: DVector<f64>,
 }
 
 impl Cosines {
     /// The evidence of all of them with these prior standard deviations.
-    pub(super) fn waves(&self, sd: &[f64]) -> Option<Waves> {
+    pub(in crate::process) fn waves(&self, sd: &[f64]) -> Option<Waves> {
         let sd = DVector::from_column_slice(sd);
         let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
         let scaled = DMatrix::from_fn(COSINES, COSINES, |i, j| unit(i, j) + sd[i] * self.g[(i, j)] * sd[j]);
@@ -194,11 +201,11 @@ impl Cosines {
 
 /// All cosines on some parts.
 #[derive(Debug, Clone)]
-pub(super) struct Waves {
+pub(in crate::process) struct Waves {
     /// ln BF.
-    pub(super) log_bf: f64,
+    pub(in crate::process) log_bf: f64,
     /// Posterior means of the sizes, in the unit of the quantity.
-    pub(super) mean: DVector<f64>,
+    pub(in crate::process) mean: DVector<f64>,
     /// Prior standard deviations, and the factor L of I + S G* S: the covariance is S (L L')^-1 S.
     sd: DVector<f64>,
     factor: Cholesky<f64, Dyn>,
@@ -206,14 +213,14 @@ pub(super) struct Waves {
 
 impl Waves {
     /// Independent standard deviations of what these sizes do along columns, one size a column of them.
-    pub(super) fn directions(&self, along: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(in crate::process) fn directions(&self, along: &DMatrix<f64>) -> DMatrix<f64> {
         let scaled = DMatrix::from_fn(COSINES, along.nrows(), |size, row| self.sd[size] * along[(row, size)]);
         let half = self.factor.l_dirty().solve_lower_triangular(&scaled);
         half.map_or_else(|| DMatrix::zeros(along.nrows(), COSINES), |half| half.transpose())
     }
 
     /// Root mean square along the part, and its variance.
-    pub(super) fn rms(&self) -> (f64, f64) {
+    pub(in crate::process) fn rms(&self) -> (f64, f64) {
         let share = |k: usize| if k == 0 { 1.0 } else { 0.5 };
         let weighted = DVector::from_fn(COSINES, |k, _| share(k) * self.mean[k]);
         let rms = self.mean.dot(&weighted).sqrt();
@@ -226,9 +233,9 @@ impl Waves {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use super::super::null::{Column, Gram, Older, Source};
     use super::*;
     use crate::num::stats::Resampler;
+    use crate::process::change::null::{Column, Gram, Older, Source};
 
     /// Causes beside the cosines.
     const CAUSES: usize = 3;

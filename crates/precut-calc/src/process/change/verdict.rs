@@ -1,9 +1,9 @@
 //! Which cause, since when, how large (`process/3.5`).
 
-use super::null::{Form, Told};
-use super::onsets::{Entry, What};
-use super::sight::{COSINES, Catalogue};
 use crate::diagnosis::log_sum_exp;
+use crate::process::change::null::{Form, Told};
+use crate::process::change::onsets::{Entry, What};
+use crate::process::part::sight::{COSINES, Catalogue};
 
 /// Share of one cause from which on it is named, of what has no name, and of the list.
 const NAMED: f64 = 0.8;
@@ -14,22 +14,22 @@ const ONSETS: f64 = 0.9;
 /// Columns that agree better than this cannot be told apart.
 const SAME: f64 = 0.9995;
 /// A normal distribution holds 95 % within so many standard deviations.
-pub(super) const NORMAL_95: f64 = 1.96;
+pub(in crate::process) const NORMAL_95: f64 = 1.96;
 
 /// What changed, as the parts tell it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Judgement {
+pub(in crate::process) struct Judgement {
     /// The 95 % list, likeliest first, with those that cannot be told from one of it.
-    pub(super) list: Vec<Suspect>,
+    pub(in crate::process) list: Vec<Suspect>,
     /// Likeliest onset and the shortest range that holds 90 %.
-    pub(super) since: u32,
-    pub(super) since_90: [u32; 2],
-    pub(super) class: Class,
+    pub(in crate::process) since: u32,
+    pub(in crate::process) since_90: [u32; 2],
+    pub(in crate::process) class: Class,
 }
 
 /// How sure the name is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Class {
+pub(in crate::process) enum Class {
     Named,
     OneOf,
     Unnamed,
@@ -37,23 +37,23 @@ pub(super) enum Class {
 
 /// A cause that may have changed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Suspect {
+pub(in crate::process) struct Suspect {
     /// Which; none has no name.
-    pub(super) name: Option<usize>,
-    pub(super) share: f64,
+    pub(in crate::process) name: Option<usize>,
+    pub(in crate::process) share: f64,
     /// Its likeliest variant and form.
-    pub(super) what: What,
-    pub(super) form: Form,
+    pub(in crate::process) what: What,
+    pub(in crate::process) form: Form,
     /// Size of that, in prior standard deviations of the variant; of what has no name its largest deviation, in the unit of
     /// the quantity.
-    pub(super) mean: f64,
-    pub(super) deviation: f64,
+    pub(in crate::process) mean: f64,
+    pub(in crate::process) deviation: f64,
     /// Whether another of the list has the same columns.
-    pub(super) same_as_other: bool,
+    pub(in crate::process) same_as_other: bool,
 }
 
 /// From all hypotheses, those that are heard; `parts` are those that the columns of causes are compared on.
-pub(super) fn judged(entries: &[Entry], catalogue: &Catalogue, parts: &[Told<'_>]) -> Option<Judgement> {
+pub(in crate::process) fn judged(entries: &[Entry], catalogue: &Catalogue, parts: &[Told<'_>]) -> Option<Judgement> {
     let weights: Vec<f64> = entries.iter().map(|entry| entry.log_weight).collect();
     let total = log_sum_exp(&weights);
     let share = |entry: &Entry| (entry.log_weight - total).exp();

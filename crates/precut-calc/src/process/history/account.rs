@@ -6,13 +6,14 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::memory::Memory;
-use super::null::Null;
-use super::sight::{Eye, Sighting, Signs};
-use super::state::State;
-use super::watch::{DocumentOf, PartOf, Watch};
 use crate::calculator::{Failure, ForwardModel, Limits, Monitor, Watched};
 use crate::num::stats::{Resampler, quantile};
+use crate::process::answer::output::State;
+use crate::process::change::null::Null;
+use crate::process::history::memory::Memory;
+use crate::process::history::watch::Watch;
+use crate::process::part::document::{DocumentOf, PartOf};
+use crate::process::part::sight::{Eye, Sighting, Signs};
 
 /// Draws of what is not known of the model.
 const DRAWS: usize = 400;
@@ -90,33 +91,33 @@ enum Tier {
 }
 
 /// A part whose account is still open.
-pub(super) struct Cut<M: Watched> {
-    pub(super) part: PartOf<M>,
-    pub(super) sighting: Sighting,
+pub(in crate::process) struct Cut<M: Watched> {
+    pub(in crate::process) part: PartOf<M>,
+    pub(in crate::process) sighting: Sighting,
 }
 
 /// Path that the base job gives, and the run that decided it.
 type Decided<M> = (<M as ForwardModel>::Run, Option<<M as ForwardModel>::Run>);
 
 /// The account: parts in memory are open, as what is known of their model still changes; older ones are closed.
-pub(super) struct Account<M: Watched> {
-    pub(super) open: VecDeque<Cut<M>>,
+pub(in crate::process) struct Account<M: Watched> {
+    pub(in crate::process) open: VecDeque<Cut<M>>,
     /// Look at parts as if they were cut on the nominal path, and on that of the base job.
     eyes: [Eye<M>; 2],
     /// Of each type the last one.
     decided: Vec<Option<Decided<M>>>,
-    pub(super) closed: Totals,
+    pub(in crate::process) closed: Totals,
     /// Standard normal numbers, a draw each row.
     normals: DMatrix<f64>,
 }
 
 /// Sums over parts.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct Totals {
+pub(in crate::process) struct Totals {
     parts: usize,
     on_other: usize,
     /// Forms of those on another path: without compensation, on the base job's path, and as cut.
-    #[serde(with = "super::snapshot::bits")]
+    #[serde(with = "crate::process::part::bits")]
     forms: [f64; 3],
     /// How many had a path of the base job.
     with_base: usize,
@@ -125,7 +126,7 @@ pub(super) struct Totals {
 }
 
 impl<M: Watched> Account<M> {
-    pub(super) fn new(document: &DocumentOf<M>) -> Self {
+    pub(in crate::process) fn new(document: &DocumentOf<M>) -> Self {
         Self {
             open: VecDeque::new(),
             eyes: [Eye::new(document.clone()), Eye::new(document.clone())],
@@ -135,7 +136,7 @@ impl<M: Watched> Account<M> {
         }
     }
 
-    pub(super) fn copy(&self) -> Self {
+    pub(in crate::process) fn copy(&self) -> Self {
         Self {
             open: self.open.iter().map(|cut| Cut { part: cut.part.clone(), sighting: cut.sighting.clone() }).collect(),
             eyes: [self.eyes[0].copy(), self.eyes[1].copy()],
@@ -146,12 +147,12 @@ impl<M: Watched> Account<M> {
     }
 
     /// The last part of a type that counts.
-    pub(super) fn last_of(&self, kind: usize) -> Option<&PartOf<M>> {
+    pub(in crate::process) fn last_of(&self, kind: usize) -> Option<&PartOf<M>> {
         self.open.iter().rev().find(|cut| cut.sighting.kind == kind).map(|cut| &cut.part)
     }
 
     /// The run on the path that the base job gives for it.
-    pub(super) fn on_base(
+    pub(in crate::process) fn on_base(
         &mut self,
         kind: usize,
         run: &M::Run,
@@ -382,7 +383,12 @@ fn interval(all: &mut [f64]) -> [f64; 2] {
 
 impl<M: Watched> Watch<M> {
     /// Takes a part into the account, closes it over parts that left the memory, and takes odd ones out.
-    pub(super) fn book(&mut self, part: &PartOf<M>, state: &State, monitor: &dyn Monitor) -> Result<(), Failure> {
+    pub(in crate::process) fn book(
+        &mut self,
+        part: &PartOf<M>,
+        state: &State,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
         let newest = self.memory.parts.back().filter(|(own, _)| own.number == part.number);
         let newest = newest.map(|(own, _)| Cut { part: part.clone(), sighting: own.clone() });
         self.account.open.extend(newest);

@@ -1,12 +1,12 @@
 //! What a person says of a change (`process/3.5`).
 
-use super::memory::Memory;
-use super::null::Source;
-use super::onsets::What;
-use super::state::{ChangeVerdict, Decided, Situation, State};
-use super::verdict::judged;
-use super::watch::Watch;
 use crate::calculator::Watched;
+use crate::process::answer::output::{ChangeVerdict, Decided, Situation, State};
+use crate::process::change::null::Source;
+use crate::process::change::onsets::What;
+use crate::process::change::verdict::judged;
+use crate::process::history::memory::Memory;
+use crate::process::history::watch::Watch;
 
 /// What a person says of a change.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -77,7 +77,8 @@ impl Memory {
     /// Of an accepted change one cause stays free.
     fn keep_alone(&mut self, id: &str, variant: usize) {
         let Some(accepted) = self.accepted.iter().find(|accepted| accepted.id == id) else { return };
-        let is_gone = |own: &super::null::Column| accepted.owns(own) && own.source != Source::Cause(variant);
+        let is_gone =
+            |own: &crate::process::change::null::Column| accepted.owns(own) && own.source != Source::Cause(variant);
         let gone: Vec<bool> = self.columns.iter().map(is_gone).collect();
         let known: Vec<bool> = gone.iter().take(self.older.eta.len()).copied().collect();
         self.older = self.older.without(&known);

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::detector::statistic;
-use super::memory::Memory;
-use super::null::{Column, Null, Older, Source, Told};
-use super::onsets::{Entry, What};
-use super::report;
-use super::state::{Change, OddPart, Situation};
-use super::verdict::{Judgement, judged};
+use crate::process::answer::output::{Change, OddPart, Situation};
+use crate::process::change::detector::statistic;
+use crate::process::change::null::{Column, Null, Older, Source, Told};
+use crate::process::change::onsets::{Entry, What};
+use crate::process::change::report;
+use crate::process::change::verdict::{Judgement, judged};
+use crate::process::history::memory::Memory;
 
 /// An accepted change goes on being refined for so many parts.
 const REFINED_FOR: usize = 30;
@@ -19,26 +19,26 @@ const MOST_TOLD: usize = 50;
 
 /// A change that was reported and is not yet part of the model.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct Pending {
-    pub(super) id: String,
-    pub(super) reported: u32,
-    pub(super) parts_since: usize,
+pub(in crate::process) struct Pending {
+    pub(in crate::process) id: String,
+    pub(in crate::process) reported: u32,
+    pub(in crate::process) parts_since: usize,
 }
 
 /// A change that is part of the model.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct Accepted {
-    pub(super) id: String,
-    pub(super) since: u32,
+pub(in crate::process) struct Accepted {
+    pub(in crate::process) id: String,
+    pub(in crate::process) since: u32,
     /// Where anything can have changed when it was found, and the part with which it joined.
-    pub(super) first: u32,
-    pub(super) joined: u32,
-    pub(super) used_then: usize,
+    pub(in crate::process) first: u32,
+    pub(in crate::process) joined: u32,
+    pub(in crate::process) used_then: usize,
 }
 
 impl Memory {
     /// What the parts say with this one: odd parts go out, an alarm is followed until its change joins the model.
-    pub(super) fn follow(&mut self, number: u32) -> (Situation, f64) {
+    pub(in crate::process) fn follow(&mut self, number: u32) -> (Situation, f64) {
         let (entries, evidence) = loop {
             let Some((entries, statistic, odd)) = self.weighed() else {
                 return (Situation::InControl, f64::NEG_INFINITY);
@@ -74,7 +74,7 @@ impl Memory {
     }
 
     /// All hypotheses, the statistic beside its threshold, and the number of a part that is odd.
-    pub(super) fn weighed(&self) -> Option<(Vec<Entry>, f64, Option<u32>)> {
+    pub(in crate::process) fn weighed(&self) -> Option<(Vec<Entry>, f64, Option<u32>)> {
         self.with_null(|told, null| {
             let entries = self.scale().entries(told, null, self.first);
             let statistic = statistic(&self.options, &entries, told, null, &self.scale());
@@ -110,7 +110,7 @@ impl Memory {
     }
 
     /// A change joins what is free.
-    pub(super) fn accept(&mut self, number: u32, judgement: &Judgement) {
+    pub(in crate::process) fn accept(&mut self, number: u32, judgement: &Judgement) {
         let Some(pending) = self.pending.take() else { return };
         for suspect in judgement.list.iter().take(MOST_CAUSES) {
             let since = Some((judgement.since, suspect.form));
@@ -165,7 +165,7 @@ impl Memory {
     }
 
     /// A change of long ago becomes part of the mean profile: what was before it is forgotten.
-    pub(super) fn close(&mut self, id: &str) {
+    pub(in crate::process) fn close(&mut self, id: &str) {
         let Some(place) = self.accepted.iter().position(|accepted| accepted.id == id) else { return };
         let gone = self.accepted.remove(place);
         self.parts.retain(|(part, _)| part.number >= gone.since);
@@ -176,7 +176,7 @@ impl Memory {
 }
 
 impl Accepted {
-    pub(super) fn owns(&self, column: &Column) -> bool {
+    pub(in crate::process) fn owns(&self, column: &Column) -> bool {
         column.since.is_some_and(|(since, _)| since == self.since)
     }
 }

@@ -5,16 +5,16 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::document::{Options, Threshold};
-use super::follow::{Accepted, Pending};
-use super::null::{Column, Gram, Null, Older, Source, Told};
-use super::onsets::{Entry, Scale, WINDOW};
-use super::report;
-use super::scatter::Scatter;
-use super::sight::{COSINES, Catalogue, Sighting};
-use super::state::{Change, OddPart, ScatterReport, Score, Situation, State, Unused};
 use crate::calculator::{Failure, Monitor};
 use crate::diagnosis::{digits_written, outliers};
+use crate::process::answer::output::{Change, OddPart, ScatterReport, Score, Situation, State, Unused};
+use crate::process::change::null::{Column, Gram, Null, Older, Source, Told};
+use crate::process::change::onsets::{Entry, Scale, WINDOW};
+use crate::process::change::report;
+use crate::process::change::scatter::Scatter;
+use crate::process::history::follow::{Accepted, Pending};
+use crate::process::part::document::{Options, Threshold};
+use crate::process::part::sight::{COSINES, Catalogue, Sighting};
 
 /// A part of which more rows than this share stand alone is measured again.
 const MOST_ODD: f64 = 0.3;
@@ -39,33 +39,33 @@ const MOST_CHANGES: usize = 6;
 
 /// All that is remembered of the parts.
 #[derive(Clone, Serialize, Deserialize)]
-pub(super) struct Memory {
-    pub(super) options: Options,
-    pub(super) noise: Option<f64>,
-    pub(super) catalogue: Catalogue,
-    pub(super) scatter: Option<Scatter>,
-    pub(super) columns: Vec<Column>,
-    pub(super) older: Older,
+pub(in crate::process) struct Memory {
+    pub(in crate::process) options: Options,
+    pub(in crate::process) noise: Option<f64>,
+    pub(in crate::process) catalogue: Catalogue,
+    pub(in crate::process) scatter: Option<Scatter>,
+    pub(in crate::process) columns: Vec<Column>,
+    pub(in crate::process) older: Older,
     /// The last parts, by ascending number, with what they tell once the scatter is known.
     #[serde(skip)]
-    pub(super) parts: VecDeque<(Sighting, Option<Gram>)>,
+    pub(in crate::process) parts: VecDeque<(Sighting, Option<Gram>)>,
     /// Parts that came, and parts that were used.
-    pub(super) came: usize,
-    pub(super) used: usize,
-    pub(super) learned_at: usize,
+    pub(in crate::process) came: usize,
+    pub(in crate::process) used: usize,
+    pub(in crate::process) learned_at: usize,
     /// Only from this number on anything can have changed that is not in the model.
-    pub(super) first: u32,
-    pub(super) pending: Option<Pending>,
-    pub(super) accepted: Vec<Accepted>,
+    pub(in crate::process) first: u32,
+    pub(in crate::process) pending: Option<Pending>,
+    pub(in crate::process) accepted: Vec<Accepted>,
     /// How many changes ever joined the model.
-    pub(super) joined: usize,
-    pub(super) reported: usize,
-    pub(super) changes: Vec<Change>,
-    pub(super) odd: Vec<OddPart>,
+    pub(in crate::process) joined: usize,
+    pub(in crate::process) reported: usize,
+    pub(in crate::process) changes: Vec<Change>,
+    pub(in crate::process) odd: Vec<OddPart>,
     /// Number, distance and rows of the last parts.
-    pub(super) scores: VecDeque<(u32, f64, usize)>,
+    pub(in crate::process) scores: VecDeque<(u32, f64, usize)>,
     /// log10 of the statistic beside its threshold, after the part before; none where nothing speaks of a change.
-    pub(super) evidence: Option<f64>,
+    pub(in crate::process) evidence: Option<f64>,
 }
 
 /// A part beside what those before it let expect.
@@ -80,7 +80,7 @@ struct Compared {
 
 impl Memory {
     /// Before the first part; `noise` is stated, in the unit of the quantity.
-    pub(super) fn new(options: Options, noise: Option<f64>) -> Self {
+    pub(in crate::process) fn new(options: Options, noise: Option<f64>) -> Self {
         Self {
             options,
             noise,
@@ -104,7 +104,7 @@ impl Memory {
         }
     }
 
-    pub(super) fn take(&mut self, mut part: Sighting, monitor: &dyn Monitor) -> Result<State, Failure> {
+    pub(in crate::process) fn take(&mut self, mut part: Sighting, monitor: &dyn Monitor) -> Result<State, Failure> {
         let number = part.number;
         self.free_up(&part);
         let Compared { odd_rows, score, gram } = self.compared(&mut part, monitor)?;
@@ -134,7 +134,7 @@ impl Memory {
     }
 
     /// Whether an earlier part has the same rows to the last digit, and scatter would not let that happen.
-    pub(super) fn is_copy(&self, part: &Sighting) -> bool {
+    pub(in crate::process) fn is_copy(&self, part: &Sighting) -> bool {
         let Some(scatter) = &self.scatter else { return false };
         // Two normal numbers fall on the same digit d with d/(2 sigma sqrt(pi)).
         let width = 2.0 * scatter.sigma * std::f64::consts::PI.sqrt();
@@ -145,7 +145,7 @@ impl Memory {
 
     /// The factor that a wrong unit leaves, and the one fitted, where the rows lie far from what was expected and, divided by either,
     /// do not.
-    pub(super) fn unit_suspected(&self, part: &Sighting) -> Option<[f64; 2]> {
+    pub(in crate::process) fn unit_suspected(&self, part: &Sighting) -> Option<[f64; 2]> {
         let scatter = self.scatter.as_ref()?;
         // Causes that no part has shown yet are in no column of what is known.
         if part.signs.causes.iter().any(|(variant, _)| !self.knows(*variant)) {
@@ -204,11 +204,11 @@ impl Memory {
     }
 
     /// Other columns are free than before.
-    pub(super) fn free_again(&mut self) {
+    pub(in crate::process) fn free_again(&mut self) {
         self.parts.iter_mut().filter_map(|(_, gram)| gram.as_mut()).for_each(Gram::forget_free);
     }
 
-    pub(super) fn look_again(&mut self) {
+    pub(in crate::process) fn look_again(&mut self) {
         let Some(scatter) = &self.scatter else { return };
         for (part, gram) in &mut self.parts {
             *gram = Some(Gram::of(part, scatter, &self.catalogue));
@@ -216,7 +216,7 @@ impl Memory {
     }
 
     /// What the parts in memory that count tell.
-    pub(super) fn with_told<T>(&self, then: impl FnOnce(&Self, &[Told<'_>]) -> T) -> Option<T> {
+    pub(in crate::process) fn with_told<T>(&self, then: impl FnOnce(&Self, &[Told<'_>]) -> T) -> Option<T> {
         self.scatter.as_ref()?;
         let counts = self.parts.iter().filter(|(part, _)| !part.odd);
         let told: Vec<Told<'_>> =
@@ -224,22 +224,22 @@ impl Memory {
         Some(then(self, &told))
     }
 
-    pub(super) fn null(&self, told: &[Told<'_>]) -> Option<Null> {
+    pub(in crate::process) fn null(&self, told: &[Told<'_>]) -> Option<Null> {
         Null::of(&self.columns, &self.older, told.iter())
     }
 
-    pub(super) fn scale(&self) -> Scale<'_> {
+    pub(in crate::process) fn scale(&self) -> Scale<'_> {
         let sigma = self.scatter.as_ref().map_or(0.0, |scatter| scatter.sigma);
         let thinned_weigh = self.options.threshold == Threshold::Calibrated;
         Scale { catalogue: &self.catalogue, sigma, thinned_weigh }
     }
 
-    pub(super) fn entries(&self, told: &[Told<'_>], first: u32) -> Vec<Entry> {
+    pub(in crate::process) fn entries(&self, told: &[Told<'_>], first: u32) -> Vec<Entry> {
         self.null(told).map_or_else(Vec::new, |null| self.scale().entries(told, &null, first))
     }
 
     /// Everything that the outlook needs: what the parts tell, and what is free.
-    pub(super) fn with_null<T>(&self, then: impl FnOnce(&[Told<'_>], &Null) -> T) -> Option<T> {
+    pub(in crate::process) fn with_null<T>(&self, then: impl FnOnce(&[Told<'_>], &Null) -> T) -> Option<T> {
         self.with_told(|memory, told| memory.null(told).map(|null| then(told, &null))).flatten()
     }
 
@@ -295,7 +295,7 @@ impl Memory {
         self.scores.len() == SCORES && by_chance < RARE
     }
 
-    pub(super) fn learn_first(&mut self, monitor: &dyn Monitor) -> Result<(), Failure> {
+    pub(in crate::process) fn learn_first(&mut self, monitor: &dyn Monitor) -> Result<(), Failure> {
         let parts: Vec<Sighting> = self.parts.iter().map(|(part, _)| part.clone()).collect();
         let first = Scatter::first(&parts, self.noise);
         for (part, _) in &mut self.parts {
@@ -311,7 +311,7 @@ impl Memory {
         Ok(())
     }
 
-    pub(super) fn learn(&mut self) {
+    pub(in crate::process) fn learn(&mut self) {
         self.look_again();
         let counts = self.parts.iter().filter(|(part, _)| !part.odd).map(|(part, _)| part.clone());
         let parts: Vec<Sighting> = counts.collect();
@@ -327,14 +327,14 @@ impl Memory {
     }
 
     /// Once more while nothing stirs: what changes would pass for scatter.
-    pub(super) fn learn_again(&mut self) {
+    pub(in crate::process) fn learn_again(&mut self) {
         let due = LEARN_AFTER.iter().any(|&after| after <= self.used && after > self.learned_at);
         if due && self.pending.is_none() && self.evidence.is_none_or(|evidence| evidence < STIRS) {
             self.learn();
         }
     }
 
-    pub(super) fn unused(&self, number: u32, why: Unused) -> State {
+    pub(in crate::process) fn unused(&self, number: u32, why: Unused) -> State {
         let situation = match (&self.scatter, &self.pending) {
             (None, _) => Situation::Learning,
             (_, Some(_)) => Situation::Changed,
@@ -343,7 +343,7 @@ impl Memory {
         State { unused: Some(why), ..self.said(number, situation, None) }
     }
 
-    pub(super) fn said(&self, number: u32, state: Situation, evidence: Option<f64>) -> State {
+    pub(in crate::process) fn said(&self, number: u32, state: Situation, evidence: Option<f64>) -> State {
         let scatter = self.scatter.as_ref().map(|scatter| ScatterReport {
             sigma: scatter.sigma,
             correlation: scatter.rho,

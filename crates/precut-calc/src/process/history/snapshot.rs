@@ -6,16 +6,15 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::account::{Cut, Totals};
-use super::edges::Edge;
-use super::memory::Memory;
-use super::null::Older;
-use super::sight::Sighting;
-use super::watch::{DocumentOf, PartOf, Watch};
 use crate::calculator::{Failure, Monitor, Watched};
+use crate::process::history::account::{Cut, Totals};
+use crate::process::history::memory::Memory;
+use crate::process::history::watch::Watch;
+use crate::process::part::document::{DocumentOf, PartOf};
+use crate::process::part::edges::Edge;
+use crate::process::part::sight::Sighting;
 
 /// A process after some of its parts, without what follows from its document and its last parts.
 #[derive(Clone, Serialize, Deserialize)]
@@ -143,48 +142,5 @@ impl<M: Watched> Watch<M> {
         watch.last = snapshot.last.map(|last| last.part::<M>(&on_record)).transpose()?;
         watch.edge = snapshot.edge;
         Ok(watch)
-    }
-}
-
-/// A symmetric matrix and a vector as they are kept.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Sums {
-    a: Vec<f64>,
-    eta: Vec<f64>,
-}
-
-impl From<Older> for Sums {
-    fn from(older: Older) -> Self {
-        Self { a: older.a.as_slice().to_vec(), eta: older.eta.as_slice().to_vec() }
-    }
-}
-
-impl TryFrom<Sums> for Older {
-    type Error = &'static str;
-
-    fn try_from(sums: Sums) -> Result<Self, Self::Error> {
-        let count = sums.eta.len();
-        if sums.a.len() != count * count {
-            return Err("a matrix that is not square");
-        }
-        Ok(Self { a: DMatrix::from_vec(count, count, sums.a), eta: DVector::from_vec(sums.eta) })
-    }
-}
-
-/// Numbers of which some may be infinite or none at all, which JSON does not have.
-pub(super) mod bits {
-    use serde::de::Error;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer, const N: usize>(all: &[f64; N], serializer: S) -> Result<S::Ok, S::Error> {
-        all.map(f64::to_bits).to_vec().serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>, const N: usize>(
-        deserializer: D,
-    ) -> Result<[f64; N], D::Error> {
-        let all: [u64; N] =
-            Vec::deserialize(deserializer)?.try_into().map_err(|_| D::Error::custom("other numbers"))?;
-        Ok(all.map(f64::from_bits))
     }
 }

@@ -1,28 +1,23 @@
 //! A process, part by part.
 
-use super::account::Account;
-use super::document::{Document, Part};
-use super::edges::{self, Edge};
-use super::memory::Memory;
-use super::sight::{Eye, Sighting, used};
-use super::state::{State, Unused};
-use crate::calculator::{Calculator, Diagnosable, Failure, Finding, ForwardModel, Monitor, Watched};
+use crate::calculator::{Failure, Finding, Monitor, Watched};
+use crate::process::answer::output::{State, Unused};
+use crate::process::history::account::Account;
+use crate::process::history::memory::Memory;
+use crate::process::part::document::{DocumentOf, PartOf};
+use crate::process::part::edges::{self, Edge};
+use crate::process::part::sight::{Eye, Sighting, used};
 
 /// A part with fewer rows says too little.
 const LEAST_ROWS: usize = 4;
 
-/// The document of a process of `M`.
-pub type DocumentOf<M> = Document<<M as Calculator>::Input, <M as ForwardModel>::Allowances>;
-/// A part of a process of `M`.
-pub type PartOf<M> = Part<<M as ForwardModel>::Run, <M as Diagnosable>::Row>;
-
 /// A process under watch. Its state is a function of the document and of the parts taken, in the order of their numbers.
 pub struct Watch<M: Watched> {
-    pub(super) eye: Eye<M>,
-    pub(super) memory: Memory,
-    pub(super) last: Option<PartOf<M>>,
-    pub(super) account: Account<M>,
-    pub(super) edge: Option<Edge>,
+    pub(in crate::process) eye: Eye<M>,
+    pub(in crate::process) memory: Memory,
+    pub(in crate::process) last: Option<PartOf<M>>,
+    pub(in crate::process) account: Account<M>,
+    pub(in crate::process) edge: Option<Edge>,
 }
 
 impl<M: Watched> Watch<M> {
@@ -88,7 +83,7 @@ impl<M: Watched> Watch<M> {
         Ok(finding.into_iter().collect())
     }
 
-    pub(super) fn seen(
+    pub(in crate::process) fn seen(
         &mut self,
         part: &PartOf<M>,
         ordinal: usize,

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::document::{Document, MOST_PARTS, Options, Part};
-use super::edges::completed;
 use crate::calculator::{Calculator, Check, Finding, Measurement, Violations, Watched};
+use crate::process::part::document::{Document, MOST_PARTS, Options, Part};
+use crate::process::part::edges::completed;
 
 /// Rows of a part at most; of more, means per station are sent.
-pub(super) const MOST_ROWS: usize = 400;
+pub(in crate::process) const MOST_ROWS: usize = 400;
 /// Types of parts at most.
 const MOST_TYPES: usize = 8;
 

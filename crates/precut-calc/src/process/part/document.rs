@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::calculator::{Calculator, Diagnosable, ForwardModel};
+
 /// Parts of a process at most.
 pub const MOST_PARTS: usize = 100_000;
 
@@ -110,7 +112,7 @@ impl Options {
         }
     }
 
-    pub(super) fn memory(&self) -> f64 {
+    pub(in crate::process) fn memory(&self) -> f64 {
         f64::from(self.memory_parts.unwrap_or_else(|| (2 * self.false_alarm_every_parts).max(1000)))
     }
 }
@@ -152,3 +154,8 @@ pub struct GaugeCheck {
     #[schema(exclusive_minimum = 0.0, maximum = 1000.0, example = 0.4, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("u"))))]
     pub uncertainty_um: f64,
 }
+
+/// The document of a process of `M`.
+pub type DocumentOf<M> = Document<<M as Calculator>::Input, <M as ForwardModel>::Allowances>;
+/// A part of a process of `M`.
+pub type PartOf<M> = Part<<M as ForwardModel>::Run, <M as Diagnosable>::Row>;

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::watch::{DocumentOf, PartOf};
 use crate::calculator::Watched;
+use crate::process::part::document::{DocumentOf, PartOf};
 
 /// The edge in use: which, after which part, and the path that it has cut.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Edge {
+pub(in crate::process) struct Edge {
     which: u32,
     number: u32,
     path_m: f64,
@@ -15,7 +15,11 @@ pub(super) struct Edge {
 
 /// The part with the path that its edge had cut, where each part since that edge came is known; as it is stated otherwise. `last`
 /// is the edge after the part before, and then after this one.
-pub(super) fn completed<M: Watched>(document: &DocumentOf<M>, part: &PartOf<M>, last: &mut Option<Edge>) -> PartOf<M> {
+pub(in crate::process) fn completed<M: Watched>(
+    document: &DocumentOf<M>,
+    part: &PartOf<M>,
+    last: &mut Option<Edge>,
+) -> PartOf<M> {
     let follows = last.filter(|before| before.number.checked_add(1) == Some(part.number));
     let by_sum = follows.zip(part.edge).and_then(|(before, edge)| match edge {
         _ if edge == before.which => Some(before.path_m),

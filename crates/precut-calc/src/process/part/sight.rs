@@ -5,20 +5,20 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::document::{Document, GaugeCheck, Part};
-use super::state::ModelShape;
 use crate::calculator::{
     Calculator, Failure, Hypothesis, Measurement, Monitor, PrepareError, Rows, Smooth, Treatment, Watched,
 };
 use crate::diagnosis::{Bound, Data, DiagnosisOptions, Known, Layout, Signatures, Sparse, Subject, cosine, layout};
 use crate::effects::Cause;
+use crate::process::answer::output::ModelShape;
+use crate::process::part::document::{Document, GaugeCheck, Part};
 
 /// The part is off by the same all along it.
 const LEVEL: &str = "size_offset";
 /// Cosines along a part.
-pub(super) const COSINES: usize = 8;
+pub(in crate::process) const COSINES: usize = 8;
 /// The gauge is off: what it reads, not the part.
-pub(super) const GAUGE: &str = "gauge_offset";
+pub(in crate::process) const GAUGE: &str = "gauge_offset";
 /// What is known of that: kind, field and unit. It is no effect of a job, so that no catalogue has it.
 pub const GAUGE_SIZE: (&str, &str, &str) = (GAUGE, "offset_um", "um");
 /// Prior standard deviation of that, on the radius as that of `size_offset`, um.
@@ -26,35 +26,35 @@ const GAUGE_UM: f64 = 8.0;
 
 /// A cause that may change, by its name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Name {
-    pub(super) kind: Cow<'static, str>,
+pub(in crate::process) struct Name {
+    pub(in crate::process) kind: Cow<'static, str>,
     /// Which of several of one kind.
-    pub(super) label: String,
+    pub(in crate::process) label: String,
 }
 
 /// One size of a cause at one point of the grid of its shapes: one column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Variant {
-    pub(super) name: usize,
+pub(in crate::process) struct Variant {
+    pub(in crate::process) name: usize,
     /// The size: its field, unit and prior standard deviation.
-    pub(super) parameter: Cow<'static, str>,
-    pub(super) unit: Cow<'static, str>,
-    pub(super) prior_sd: f64,
+    pub(in crate::process) parameter: Cow<'static, str>,
+    pub(in crate::process) unit: Cow<'static, str>,
+    pub(in crate::process) prior_sd: f64,
     /// Least and largest value of the change.
-    #[serde(with = "super::snapshot::bits")]
-    pub(super) range: [f64; 2],
+    #[serde(with = "crate::process::part::bits")]
+    pub(in crate::process) range: [f64; 2],
     /// Which of the variables of the hypothesis, and what the others are; none of the gauge.
-    pub(super) setting: Option<(usize, Vec<f64>)>,
+    pub(in crate::process) setting: Option<(usize, Vec<f64>)>,
     /// The form that it has: what tells it from the other columns of its cause.
-    pub(super) shape: Vec<ModelShape>,
+    pub(in crate::process) shape: Vec<ModelShape>,
     /// Whether it is free although nothing changed.
-    pub(super) in_null: bool,
+    pub(in crate::process) in_null: bool,
 }
 
 impl Variant {
     /// Least and largest change, in prior standard deviations. Of what is free although nothing changed nobody knows from where
     /// it changes: it has no bounds.
-    pub(super) fn reach(&self) -> [f64; 2] {
+    pub(in crate::process) fn reach(&self) -> [f64; 2] {
         if self.in_null {
             return [f64::NEG_INFINITY, f64::INFINITY];
         }
@@ -64,9 +64,9 @@ impl Variant {
 
 /// All causes that the parts so far can speak of.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct Catalogue {
-    pub(super) names: Vec<Name>,
-    pub(super) variants: Vec<Variant>,
+pub(in crate::process) struct Catalogue {
+    pub(in crate::process) names: Vec<Name>,
+    pub(in crate::process) variants: Vec<Variant>,
 }
 
 impl Catalogue {
@@ -88,7 +88,7 @@ impl Catalogue {
 
     /// Share of every variant of all that may change. Names have equal shares, which their variants divide; a level that
     /// moved is one name, be it that of the part or of the gauge.
-    pub(super) fn shares(&self) -> Vec<f64> {
+    pub(in crate::process) fn shares(&self) -> Vec<f64> {
         let weight = |name: usize| if [LEVEL, GAUGE].contains(&&*self.names[name].kind) { 0.5 } else { 1.0 };
         let total: f64 = (0..self.names.len()).map(weight).sum();
         let count = |name: usize| self.variants.iter().filter(|variant| variant.name == name).count() as f64;
@@ -96,29 +96,29 @@ impl Catalogue {
     }
 
     /// The variant of the gauge.
-    pub(super) fn gauge(&self) -> Option<usize> {
+    pub(in crate::process) fn gauge(&self) -> Option<usize> {
         self.variants.iter().position(|variant| variant.setting.is_none())
     }
 }
 
 /// What does not depend on what was measured: parts that were cut and measured alike share it.
-pub(super) struct Signs {
+pub(in crate::process) struct Signs {
     /// Prediction of the model, in the unit of the quantity; 0 where it has none.
-    pub(super) base: Vec<f64>,
-    pub(super) predicted: Vec<bool>,
-    pub(super) layout: Layout,
-    pub(super) cosines: Vec<Vec<f64>>,
+    pub(in crate::process) base: Vec<f64>,
+    pub(in crate::process) predicted: Vec<bool>,
+    pub(in crate::process) layout: Layout,
+    pub(in crate::process) cosines: Vec<Vec<f64>>,
     /// Columns of variants, at one prior standard deviation.
-    pub(super) causes: Vec<(usize, Vec<f64>)>,
+    pub(in crate::process) causes: Vec<(usize, Vec<f64>)>,
     /// One stated standard deviation of each allowance of a single part.
-    pub(super) scatter: Vec<Vec<f64>>,
+    pub(in crate::process) scatter: Vec<Vec<f64>>,
     /// What the gauge reads of 1 um on the diameter.
-    pub(super) per_um: f64,
+    pub(in crate::process) per_um: f64,
 }
 
 /// Looks at parts; what it saw last of each type is kept.
-pub(super) struct Eye<M: Watched> {
-    pub(super) document: Document<<M as Calculator>::Input, M::Allowances>,
+pub(in crate::process) struct Eye<M: Watched> {
+    pub(in crate::process) document: Document<<M as Calculator>::Input, M::Allowances>,
     seen: Vec<Option<Before<M>>>,
 }
 
@@ -132,12 +132,12 @@ struct Before<M: Watched> {
 }
 
 impl<M: Watched> Eye<M> {
-    pub(super) fn new(document: Document<<M as Calculator>::Input, M::Allowances>) -> Self {
+    pub(in crate::process) fn new(document: Document<<M as Calculator>::Input, M::Allowances>) -> Self {
         let seen = document.part_types.keys().map(|_| None).collect();
         Self { document, seen }
     }
 
-    pub(super) fn copy(&self) -> Self {
+    pub(in crate::process) fn copy(&self) -> Self {
         let copied = |before: &Before<M>| Before {
             run: before.run.clone(),
             rows: before.rows.clone(),
@@ -148,18 +148,18 @@ impl<M: Watched> Eye<M> {
     }
 
     /// Number of a type in the order of the names.
-    pub(super) fn kind(&self, part: &Part<M::Run, M::Row>) -> Result<usize, Failure> {
+    pub(in crate::process) fn kind(&self, part: &Part<M::Run, M::Row>) -> Result<usize, Failure> {
         let known = self.document.part_types.keys().position(|name| *name == part.part_type);
         known.ok_or_else(|| Failure::Internal(format!("a part of an unknown type {}", part.part_type)))
     }
 
     /// What was measured of a part, row by row.
-    pub(super) fn values(&self, part: &Part<M::Run, M::Row>) -> Vec<f64> {
+    pub(in crate::process) fn values(&self, part: &Part<M::Run, M::Row>) -> Vec<f64> {
         used(part).into_iter().filter_map(|row| part.measurements[row].value(&self.document.quantity)).collect()
     }
 
     /// What a part shows, whatever was measured of it.
-    pub(super) fn signs(
+    pub(in crate::process) fn signs(
         &mut self,
         part: &Part<M::Run, M::Row>,
         catalogue: &mut Catalogue,
@@ -180,7 +180,7 @@ impl<M: Watched> Eye<M> {
     }
 
     /// The model bound to the rows of a part.
-    pub(super) fn bound<'m>(
+    pub(in crate::process) fn bound<'m>(
         &self,
         part: &Part<M::Run, M::Row>,
         monitor: &'m dyn Monitor,
@@ -192,7 +192,7 @@ impl<M: Watched> Eye<M> {
     }
 
     /// The model bound to places on a part.
-    pub(super) fn bound_at<'m>(
+    pub(in crate::process) fn bound_at<'m>(
         &self,
         part_type: &str,
         run: &M::Run,
@@ -210,7 +210,7 @@ impl<M: Watched> Eye<M> {
     }
 
     /// What a part would show at places along it, all in one sweep.
-    pub(super) fn signs_at(
+    pub(in crate::process) fn signs_at(
         &self,
         part_type: &str,
         run: &M::Run,
@@ -311,7 +311,7 @@ fn lives_by_conditions(cause: &Cause, order: usize, grid_point: Option<usize>, p
 }
 
 /// Rows of a part that count.
-pub(super) fn used<R, W: Measurement>(part: &Part<R, W>) -> Vec<usize> {
+pub(in crate::process) fn used<R, W: Measurement>(part: &Part<R, W>) -> Vec<usize> {
     (0..part.measurements.len()).filter(|&row| !part.measurements[row].excluded()).collect()
 }
 
@@ -327,7 +327,7 @@ fn unprepared(error: PrepareError) -> Failure {
 
 impl Signs {
     /// A part of which nothing was measured.
-    pub(super) fn unmeasured(self: Arc<Self>, number: u32, kind: usize) -> Sighting {
+    pub(in crate::process) fn unmeasured(self: Arc<Self>, number: u32, kind: usize) -> Sighting {
         let rows = self.base.len();
         Sighting {
             number,
@@ -346,31 +346,31 @@ impl Signs {
 
 /// A part in the memory of the process.
 #[derive(Clone)]
-pub(super) struct Sighting {
-    pub(super) number: u32,
+pub(in crate::process) struct Sighting {
+    pub(in crate::process) number: u32,
     /// How many parts had come before it.
-    pub(super) ordinal: usize,
-    pub(super) kind: usize,
-    pub(super) signs: Arc<Signs>,
-    pub(super) value: Vec<f64>,
+    pub(in crate::process) ordinal: usize,
+    pub(in crate::process) kind: usize,
+    pub(in crate::process) signs: Arc<Signs>,
+    pub(in crate::process) value: Vec<f64>,
     /// Measured minus predicted.
-    pub(super) residual: Vec<f64>,
+    pub(in crate::process) residual: Vec<f64>,
     /// Rows that count.
-    pub(super) keep: Vec<bool>,
-    pub(super) checks: Vec<GaugeCheck>,
+    pub(in crate::process) keep: Vec<bool>,
+    pub(in crate::process) checks: Vec<GaugeCheck>,
     /// Path that its edge had cut when it began, m, where that is known.
-    pub(super) path_m: Option<f64>,
+    pub(in crate::process) path_m: Option<f64>,
     /// Whether it is odd by itself and counts no more.
-    pub(super) odd: bool,
+    pub(in crate::process) odd: bool,
 }
 
 impl Sighting {
-    pub(super) fn data(&self) -> Data {
+    pub(in crate::process) fn data(&self) -> Data {
         Data { value: self.value.clone(), uncertainty: None, sides: None, layout: self.signs.layout.clone() }
     }
 
     /// Its allowances, each times a factor.
-    pub(super) fn scatter(&self, factors: &[f64]) -> Vec<Sparse> {
+    pub(in crate::process) fn scatter(&self, factors: &[f64]) -> Vec<Sparse> {
         let scaled = |(column, factor): (&Vec<f64>, &f64)| column.iter().map(|x| x * factor).collect::<Vec<_>>();
         self.signs.scatter.iter().zip(factors).map(|pair| Sparse::of(&scaled(pair))).collect()
     }
