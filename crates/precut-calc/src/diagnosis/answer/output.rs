@@ -266,7 +266,7 @@ fn noise_sources() -> Object {
 /// A test of the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TestReport {
-    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, `held_out`, of classes `deviance`.
+    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, `held_out`, of classes `deviance`, `levels`.
     pub test: String,
     /// Its statistic.
     #[schema(extensions(("x-unit" = json!("1"))))]
