@@ -12,6 +12,7 @@ use super::super::job::{Case, Job, beyond_modes, fits, guessed};
 use super::super::model::{Alias, Cut, Mode, Multiplier, Orders};
 use super::forward::{CutMargin, MillingPoint, MillingRun};
 use super::limits::{Look, cut_at, first_limit_mm, teeth_per_period};
+use super::lobes::limit_over_speed;
 
 /// Of the frequencies of a disturbance those count whose share is at least this times the largest: which of them sounds loudest
 /// depends on where it is heard.
@@ -19,8 +20,6 @@ const LOUD: f64 = 0.3;
 /// A cut behaves like one of a depth within its scatter, and near a depth at which another mode takes over it may sound as either: depths
 /// over its own whose frequencies count, too, two usual scatters to either side.
 const SOUNDS: [f64; 2] = [0.9, 1.1];
-/// Speeds at which a limit is drawn.
-const SPEEDS: u32 = 40;
 /// Widths and feeds whose limits are drawn.
 const MOST_CURVES: usize = 4;
 
@@ -229,14 +228,13 @@ impl PreparedMilling {
         let mut curves = Vec::new();
         for case in self.cases.iter().take(MOST_CURVES) {
             let case = case.clone().with_effects(effects);
-            let at = |k: u32| ends.0 * (ends.1 / ends.0).powf(f64::from(k) / f64::from(SPEEDS - 1));
-            let along: Vec<f64> = (0..SPEEDS).map(at).collect();
-            let limit = |speed: &f64| self.limit_mm(&case, *speed, most_mm, monitor);
+            let limit = |speed: f64| self.limit_mm(&case, speed, most_mm, monitor);
+            let found = limit_over_speed([ends.0, ends.1], most_mm, limit)?;
             curves.push(LimitCurve {
                 feed_mm_per_tooth: case.milling.feed_mm,
                 width_mm: Some(case.width_mm),
-                depth_mm: along.par_iter().map(limit).collect::<Result<_, _>>()?,
-                spindle_speed_rpm: along,
+                depth_mm: found.iter().map(|(_, limit)| *limit).collect(),
+                spindle_speed_rpm: found.iter().map(|(speed, _)| *speed).collect(),
                 low_mm: Vec::new(),
                 high_mm: Vec::new(),
             });
