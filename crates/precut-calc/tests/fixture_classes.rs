@@ -130,7 +130,7 @@ fn the_example_is_told() {
     // Both are logarithms of probabilities.
     assert!(held_out.log_score_base < 0.0 && held_out.log_score_extended < 0.0);
     assert_eq!(result.noise.source, "spread");
-    assert_eq!(result.tests.iter().map(|test| test.test.as_str()).collect::<Vec<_>>(), ["deviance"]);
+    assert_eq!(result.tests.iter().map(|test| test.test.as_str()).collect::<Vec<_>>(), ["deviance", "levels"]);
     assert!(result.outliers.is_empty());
 }
 

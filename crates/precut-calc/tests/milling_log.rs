@@ -270,7 +270,8 @@ fn the_slow_mode_of_the_example_is_named_and_the_limit_runs_within_its_band() {
     assert_eq!(diagnosed(&known).verdict, VerdictClass::Adequate);
 }
 
-/// The cut that is advised, made as the model of the truth makes it, makes the truth more probable than it was.
+/// The cut that is advised, made as the model of the truth makes it, makes the truth more probable than it was, and than cuts anywhere in
+/// the range of the log make it on average.
 #[test]
 fn the_next_cut_that_is_advised_speaks_for_the_truth() {
     let mut request = example();
@@ -296,14 +297,24 @@ fn the_next_cut_that_is_advised_speaks_for_the_truth() {
         result.sets.iter().filter(|set| is_truth(&set.causes)).map(|set| set.posterior).sum::<f64>()
     };
     // Four cuts, as the model of the truth makes them.
-    let cut = |run: &MillingRun| {
-        let (speed, depth) = (run.spindle_speed_rpm.unwrap(), run.depth_mm.unwrap());
+    let cut = |speed: f64, depth: f64| {
         let class = if predicted(&truth, &[at(speed, depth)], &[])[0] > 0.0 { "stable" } else { "chatter" };
         let row = json!({ "spindle_speed_rpm": speed, "depth_mm": depth, "class": class });
         let mut with = request.clone();
         with["measurements"].as_array_mut().unwrap().extend(vec![row; 4]);
         probability(&diagnosed(&with))
     };
-    let (advised, before) = (cut(&next.run), probability(&before));
+    let (run, before) = (&next.run, probability(&before));
+    let advised = cut(run.spindle_speed_rpm.unwrap(), run.depth_mm.unwrap());
     assert!(next.candidates.len() >= 6 && advised > before + 0.05, "{advised} {before}");
+    let numbers = |field: &str| rows.iter().map(|row| row[field].as_f64().unwrap()).collect::<Vec<f64>>();
+    let place = |field: &str, share: f64| {
+        let (low, high) =
+            numbers(field).into_iter().fold((f64::INFINITY, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+        low * (high / low).powf(share)
+    };
+    let anywhere = [(0.13, 0.6), (0.37, 0.2), (0.61, 0.8), (0.87, 0.4)];
+    let on_average =
+        anywhere.map(|(n, h)| cut(place("spindle_speed_rpm", n), place("depth_mm", h))).iter().sum::<f64>() / 4.0;
+    assert!(advised > on_average, "{advised} {on_average}");
 }

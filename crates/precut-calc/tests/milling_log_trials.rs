@@ -3,6 +3,8 @@
 //! A diagnosis takes ten seconds, so one of each is drawn here; with `PRECUT_TRIALS` as many as it says.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
+use precut_calc::calculator::{Calculator, Unwatched};
+use precut_calc::diagnosis::{Diagnosis, VerdictClass};
 use precut_calc::milling_stability::MillingStability;
 use precut_trials::score::Score;
 use precut_trials::{Class, milling};
@@ -25,4 +27,16 @@ fn one_hidden_cause_of_a_log_is_named_right_or_not_at_all() {
     let score = score("milling-log-one", Class::One, 5.0, 2, 1);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.90), "{}", score.truth_listed);
+}
+
+/// The limit is off at one speed of eight by more than half, and the frequencies are right: as long as a remainder moved both alike, and all
+/// rows were tested as one sum, eight of 22 such logs were called adequate, this one among them.
+#[test]
+fn a_log_whose_limit_is_off_at_one_speed_is_not_called_adequate() {
+    let trial = milling::draw_log(Class::Outside, 5.0, blind_trials::seed_of(9, 18));
+    assert_eq!(trial.truth.causes[0].kind, "odd_speed");
+    let job = blind_trials::job::<MillingStability>(&trial.request, serde_json::json!({ "held_out": false }));
+    let result = Diagnosis::<MillingStability>::run(&job, &Unwatched).unwrap().output;
+    assert_eq!(result.verdict, VerdictClass::Unknown, "{:?}", result.tests);
+    assert!(result.tests.iter().any(|test| test.test == "levels" && test.rejects), "{:?}", result.tests);
 }

@@ -89,6 +89,17 @@ pub trait Diagnosable:
         monitor: &dyn Monitor,
     ) -> Result<NextRuns<Self::Run, Self::Point>, Failure>;
 
+    /// Of a quantity that is a class: what may be seen of every row, each a cut of its own, with these effects; a row that cannot be
+    /// computed is `None`. `None` of all where a model tells no more than the margin that it predicts.
+    fn outlooks(
+        _prepared: &Self::Prepared,
+        _allowances: &Self::Allowances,
+        _effects: &[Self::Effect],
+        _monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<Option<Outlook>>>, Failure> {
+        Ok(None)
+    }
+
     /// Where a row of a next run would be measured, by the fields of a row; nothing where its run says it all, or where
     /// another point is of the same row.
     fn place(_point: &Self::Point) -> Vec<(&'static str, Option<f64>)> {
@@ -262,6 +273,19 @@ pub struct NextRun<R, P> {
     pub run: R,
     /// Where it would be measured.
     pub points: Vec<P>,
+}
+
+/// What may be seen of a cut: its class, and beside one that is not quiet a value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlook {
+    /// Its margin, and the standard deviation of its scatter.
+    pub margin: f64,
+    /// See `margin`.
+    pub scatter: f64,
+    /// Logarithms of the values that may be measured, likeliest first; none where there is none.
+    pub heard: Vec<f64>,
+    /// Standard deviation of such a logarithm.
+    pub heard_scatter: f64,
 }
 
 /// Rows that are classes in the plane of spindle speed and depth of cut.

@@ -23,8 +23,8 @@ pub use conflict::{Conflict, ConstraintName, ElasticScope, Infeasible, Relaxatio
 pub use consequence::{Allowed, Consequence};
 pub use design::{Condition, Design, Grouping, Smooth};
 pub use diagnosable::{
-    ClassLimits, Diagnosable, KnownOver, LimitCurve, Measurement, NextRun, NextRuns, Over, Reading, ToldEffects,
-    Unnamed,
+    ClassLimits, Diagnosable, KnownOver, LimitCurve, Measurement, NextRun, NextRuns, Outlook, Over, Reading,
+    ToldEffects, Unnamed,
 };
 pub(crate) use diagnosable::{divided, values_by_name};
 pub use figure::{Along, Axis, Figure, Frame, Glyph, Handle, Item, Move, Panel, Place, Role, Said, Setting, Spacing};

@@ -78,17 +78,54 @@ pub fn draw_log_hiding(kind: &str, shift: f64, seed: u64) -> Trial {
     drawn(class, cause, shift, seed)
 }
 
+/// The same log as [`draw_log`] with the machine that it was cut on, which can cut more.
+pub fn draw_log_and_machine(class: Class, shift: f64, seed: u64) -> (Trial, Machine) {
+    drawn_with_machine(class, None, shift, seed)
+}
+
 fn drawn(class: Class, given: Option<Size>, shift: f64, seed: u64) -> Trial {
+    drawn_with_machine(class, given, shift, seed).0
+}
+
+fn drawn_with_machine(class: Class, given: Option<Size>, shift: f64, seed: u64) -> (Trial, Machine) {
     let mut random = Random::new(seed);
     loop {
         // A cause that cannot be seen on this cutter is drawn again, with another.
-        if let Some(trial) = attempt(class, given, shift, &mut random) {
-            return trial;
+        if let Some((trial, mill, scatter, level)) = attempt(class, given, shift, &mut random) {
+            return (trial, Machine { mill, scatter, level, random });
         }
     }
 }
 
-fn attempt(class: Class, given: Option<Size>, shift: f64, random: &mut Random) -> Option<Trial> {
+/// A machine with what is hidden in it.
+pub struct Machine {
+    mill: Mill,
+    scatter: f64,
+    level: f64,
+    random: Random,
+}
+
+impl Machine {
+    /// A cut at a speed, rev/min, and a depth, mm, as a row of its log. Each is another cut, even of the same numbers.
+    pub fn cut(&mut self, spindle_rpm: f64, depth_mm: f64) -> Value {
+        row(&self.mill, [spindle_rpm, depth_mm], [self.level, self.scatter], &mut self.random)
+    }
+}
+
+/// A cut at a speed and a depth that behaves like one of another depth: off by `level`, and from cut to cut.
+fn row(mill: &Mill, [rpm, depth]: [f64; 2], [level, scatter]: [f64; 2], random: &mut Random) -> Value {
+    let scattered = level + scatter * random.student_6();
+    let followed = mill.follow(rpm, depth * (-scattered).exp());
+    let chatters = followed.growth > 0.0;
+    let class = if chatters { "chatter" } else { "stable" };
+    let mut row = json!({ "spindle_speed_rpm": rpm, "depth_mm": depth, "class": class });
+    if chatters && random.chance(LISTENED) {
+        row["frequency_hz"] = json!(round(followed.loudest_hz() * (1.0 + HEARD * random.normal()), 1));
+    }
+    row
+}
+
+fn attempt(class: Class, given: Option<Size>, shift: f64, random: &mut Random) -> Option<(Trial, Mill, f64, f64)> {
     let rig = rig(random)?;
     let scatter = random.uniform(0.03, 0.06);
     let mut odd = vec![0.0; rig.speeds.len()];
@@ -127,21 +164,12 @@ fn attempt(class: Class, given: Option<Size>, shift: f64, random: &mut Random) -
         // Around the limit that the base predicts, as whoever wants to know it would cut.
         for k in 0..DEPTHS {
             let depth = round((rig.limits[speed] + STEP * (k as f64 - 0.5 * (DEPTHS as f64 - 1.0))).exp(), 3);
-            // A cut behaves like one of another depth.
-            let scattered = odd[speed] + level + scatter * random.student_6();
-            let followed = mill.follow(rpm, depth * (-scattered).exp());
-            let chatters = followed.growth > 0.0;
-            let mut row = json!({
-                "spindle_speed_rpm": rpm, "depth_mm": depth, "class": if chatters { "chatter" } else { "stable" }
-            });
-            if chatters && random.chance(LISTENED) {
-                row["frequency_hz"] = json!(round(followed.loudest_hz() * (1.0 + HEARD * random.normal()), 1));
-            }
-            rows.push(row);
+            rows.push(row(&mill, [rpm, depth], [odd[speed] + level, scatter], random));
         }
     }
     let request = rig.request(&rows);
-    Some(Trial { request, truth: Truth { class, causes, together: Vec::new() }, sigma: scatter, later: None })
+    let truth = Truth { class, causes, together: Vec::new() };
+    Some((Trial { request, truth, sigma: scatter, later: None }, mill, scatter, level))
 }
 
 fn hidden(kind: &'static str, size: f64, shapes: Vec<(&'static str, f64)>, snr: f64) -> Hidden {

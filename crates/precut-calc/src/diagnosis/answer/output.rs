@@ -266,7 +266,7 @@ fn noise_sources() -> Object {
 /// A test of the base.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TestReport {
-    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, `held_out`, of classes `deviance`.
+    /// `lack_of_fit`, `smooth_directions`, `ljung_box`, `runs`, `held_out`, of classes `deviance`, `levels`.
     pub test: String,
     /// Its statistic.
     #[schema(extensions(("x-unit" = json!("1"))))]
@@ -529,6 +529,10 @@ pub struct NextReport<R: ToSchema> {
     /// Bayes factor to be expected from this run.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub bayes_factor: f64,
+    /// Of a class: by how much the entropy over the sets that may be right is expected to fall with it, nats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub entropy_drop_nats: Option<f64>,
     /// Rows of this kind that would bring odds of 20 to 1; absent where more than twenty such runs would be needed.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub rows_needed: Option<u32>,
@@ -588,6 +592,10 @@ pub struct CandidateReport<R: ToSchema> {
     /// Bayes factor to be expected from this run.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub bayes_factor: f64,
+    /// Of a class: by how much the entropy over the sets that may be right is expected to fall with it, nats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub entropy_drop_nats: Option<f64>,
 }
 
 /// Row by row, in the order of the measurements; values in the unit of the quantity (logarithms where it is logarithmic).

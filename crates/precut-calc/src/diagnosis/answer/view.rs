@@ -301,6 +301,7 @@ impl<'a> View<'a> {
             separation_now_sigmas: next.separation_now,
             separation_then_sigmas: best.separation_then,
             bayes_factor: best.bayes_factor,
+            entropy_drop_nats: best.entropy_drop_nats,
             rows_needed: best.settles.map(|(rows, _)| count(rows)),
             cost_to_settle: best.settles.map(|(_, cost)| cost),
             further_runs: further.collect(),
@@ -313,6 +314,7 @@ impl<'a> View<'a> {
                     separation_sigmas: own.separation_then,
                     cost_to_settle: own.settles.map(|(_, cost)| cost),
                     bayes_factor: own.bayes_factor,
+                    entropy_drop_nats: own.entropy_drop_nats,
                 })
                 .collect(),
         }

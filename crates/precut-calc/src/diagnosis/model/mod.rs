@@ -5,5 +5,6 @@ pub(super) mod extension;
 pub(super) mod gain;
 pub(super) mod known;
 pub(super) mod next;
+pub(super) mod outlook;
 pub(super) mod outlying;
 pub(super) mod term;

@@ -8,6 +8,7 @@ use crate::diagnosis::calculator::{JobOf, base_of};
 use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::{Setting, Subject};
 use crate::diagnosis::input::DiagnosisOptions;
+use crate::diagnosis::model::outlook::{Outlooks, Told};
 use crate::diagnosis::rows::data::{Data, Layout};
 use crate::diagnosis::rows::sparse::Sparse;
 use crate::diagnosis::statistics::whiten::Whitener;
@@ -19,6 +20,8 @@ const SETTLING_ODDS: f64 = 20.0;
 /// A run of which more than so many would be needed to settle it is no advice.
 const MOST_RUNS: f64 = 20.0;
 
+/// A further cut that is expected to tell less, nats, is not added.
+const LEAST_TOLD: f64 = 1e-3;
 /// Rivals that several runs are to part from the leader at most.
 const MOST_RIVALS: usize = 4;
 
@@ -58,6 +61,8 @@ pub struct Looked<R> {
     pub bayes_factor: f64,
     /// Rows of this kind that would bring odds of 20 to 1, and what they cost; `None` where no number would.
     pub settles: Option<(usize, f64)>,
+    /// Of a class: by how much the entropy over the sets that may be right is expected to fall, nats.
+    pub entropy_drop_nats: Option<f64>,
 }
 
 /// A run that is measured with those before it.
@@ -88,6 +93,10 @@ pub(in crate::diagnosis) fn next_measurement<M: Diagnosable>(
     let separation_now = now.separation(&other);
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
     let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges), monitor)?;
+    if let Some(outlooks) = Outlooks::of::<M>(job, &runs, weighing, [Some(leader), rival], monitor)? {
+        let members = [leader.members.clone(), rival.map_or_else(Vec::new, |rival| rival.members.clone())];
+        return Ok(planning.telling(&runs, &outlooks, members, separation_now));
+    }
     let candidates = planning.looked_at(&runs, &[], [Some(leader), rival], separation_now)?;
     let Some(best) = cheapest(&candidates).cloned() else { return Ok(None) };
     let further = if best.settles.is_some() { planning.further(&runs, best.number, leader)? } else { Vec::new() };
@@ -140,6 +149,7 @@ impl<M: Diagnosable> Planning<'_, M> {
                 separation_then,
                 bayes_factor: bayes_factor(separation_before, separation_then),
                 settles: settles(gained, rows, [options.cost_per_run, options.cost_per_row]),
+                entropy_drop_nats: None,
             });
         }
         Ok(all)
@@ -167,6 +177,51 @@ impl<M: Diagnosable> Planning<'_, M> {
             further.push(Further { looked, rival, separation_before });
         }
         Ok(further)
+    }
+}
+
+impl<M: Diagnosable> Planning<'_, M> {
+    /// The cuts by what is expected to be seen of them: that by which the entropy over the sets that may be right falls farthest, and
+    /// with it those that tell most after it.
+    fn telling(
+        &self,
+        runs: &[Run<M>],
+        outlooks: &Outlooks,
+        [leader, rival]: [Vec<usize>; 2],
+        separation_now: f64,
+    ) -> Option<NextMeasurement<M::Run>> {
+        let options = &self.job.options;
+        let then = |log_bayes: f64| (separation_now * separation_now + 2.0 * log_bayes).sqrt();
+        let looked = |number: usize, told: &Told| Looked {
+            number,
+            changes: runs[number].changes,
+            run: runs[number].run.clone(),
+            rows: 1,
+            places: columns::<M>(&runs[number].points),
+            separation_then: then(told.log_bayes),
+            bayes_factor: told.log_bayes.min(600.0).exp(),
+            settles: settles(2.0 * told.log_bayes, 1, [options.cost_per_run, options.cost_per_row]),
+            entropy_drop_nats: Some(told.of_sets),
+        };
+        let told: Vec<(usize, Told)> = (0..runs.len()).filter_map(|cut| Some((cut, outlooks.told(cut)?))).collect();
+        let best = told.iter().max_by(|a, b| a.1.of_sets.total_cmp(&b.1.of_sets))?;
+        let mut made = vec![best.0];
+        let mut further = Vec::new();
+        let mut log_bayes = best.1.log_bayes;
+        while made.len() < usize::from(options.next_runs) {
+            let after = |(cut, own): &(usize, Told)| Some((*cut, *own, outlooks.told_after(&made, *cut)?));
+            let most = told.iter().filter_map(after).max_by(|a, b| a.2.total_cmp(&b.2));
+            let Some((cut, own, of_sets)) = most.filter(|most| most.2 > LEAST_TOLD) else { break };
+            let separation_before = then(log_bayes);
+            log_bayes += own.log_bayes;
+            let looked =
+                Looked { separation_then: then(log_bayes), entropy_drop_nats: Some(of_sets), ..looked(cut, &own) };
+            further.push(Further { looked, rival: rival.clone(), separation_before });
+            made.push(cut);
+        }
+        let candidates = told.iter().map(|(cut, own)| looked(*cut, own)).collect();
+        let best = looked(best.0, &best.1);
+        Some(NextMeasurement { best, separation_now, leader, rival, further, candidates })
     }
 }
 
@@ -303,7 +358,7 @@ mod tests {
         let (changes, run, places, bayes_factor) = ("depth_mm", (), BTreeMap::new(), 1.0);
         let separation_then = gained.sqrt();
         let settles = settles(gained, rows, costs);
-        Looked { number, changes, run, rows, places, separation_then, bayes_factor, settles }
+        Looked { number, changes, run, rows, places, separation_then, bayes_factor, settles, entropy_drop_nats: None }
     }
 
     fn best(rows_and_gains: [(usize, f64); 2], costs: [f64; 2]) -> Looked<()> {

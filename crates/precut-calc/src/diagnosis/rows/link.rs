@@ -18,6 +18,8 @@ const FAR: f64 = -60.0;
 /// a scatter of 1 %.
 const OTHERS: f64 = 0.05;
 const OTHER_DENSITY: f64 = 1e-3;
+/// That factor in standard deviations.
+const OTHERS_SPREAD: f64 = 100.0;
 
 /// Whether a row is no class, but was measured to stand at zero.
 pub(in crate::diagnosis) fn is_value(side: f64) -> bool {
@@ -34,10 +36,10 @@ fn as_meant(margin: f64) -> f64 {
     (-0.5 * margin * margin).exp()
 }
 
-/// Minus twice [`log_likelihood`] of a value that is drawn as values scatter: one normal number, moved, or another value.
+/// Where a value stands that is drawn as values scatter, in standard deviations, from one normal and one uniform number: about zero, or
+/// anywhere within a factor of e.
 pub(in crate::diagnosis) fn drawn_value(normal: f64, uniform: f64) -> f64 {
-    let drawn = if uniform < OTHERS { f64::MAX.sqrt() } else { normal };
-    -2.0 * log_likelihood(0.0, drawn)
+    if uniform < OTHERS { OTHERS_SPREAD * (uniform / OTHERS - 0.5) } else { normal }
 }
 
 /// Slope of [`log_likelihood`] over the margin, and minus its second derivative; where the tail of a class makes that negative, 0.
@@ -147,8 +149,8 @@ mod tests {
             (log_likelihood(0.0, 1.0) + 0.5).abs() < 2e-3
                 && (log_likelihood(0.0, 1e6) - OTHER_DENSITY.ln()).abs() < 1e-12
         );
-        assert!(
-            (drawn_value(0.3, 0.9) + 2.0 * log_likelihood(0.0, 0.3)).abs() < 1e-15 && drawn_value(0.3, 0.01) > 13.8
-        );
+        assert!((drawn_value(0.3, 0.9) - 0.3).abs() < 1e-15);
+        let [low, high] = [0.0, 0.999_999 * OTHERS].map(|uniform| drawn_value(0.3, uniform));
+        assert!((low + 50.0).abs() < 1e-9 && (high - 50.0).abs() < 1e-3, "{low} {high}");
     }
 }

@@ -11,6 +11,7 @@ use crate::diagnosis::rows::sparse::Sparse;
 use crate::diagnosis::statistics::blocks::Blocks;
 use crate::diagnosis::statistics::evidence::{Normal, Scale, Side, log_det, log_mean_exp};
 use crate::diagnosis::statistics::likelihood::Likelihood;
+use crate::diagnosis::statistics::values_beside::{ValuesBeside, members};
 use crate::diagnosis::statistics::whiten::White;
 
 /// Cosines common to all runs.
@@ -138,12 +139,14 @@ pub(in crate::diagnosis) fn kinds(
     monitor: &dyn Monitor,
 ) -> Result<Vec<Kind>, Failure> {
     let rows = data.value.len();
-    let on_all = |values: &dyn Fn(usize) -> f64| Sparse::new(rows, (0..rows).map(|row| (row, values(row))));
+    let on_all = |of: &dyn Fn(usize) -> f64| Sparse::new(rows, (0..rows).map(|row| (row, of(row))));
     let smooth = |name, columns, waves: &[Wave]| Kind::smooth(name, columns, waves, likelihood, sigma);
     let per_unit = unnamed.map(|column| (column.iter().map(|c| c * c).sum::<f64>() / rows as f64).sqrt());
     let per_unit = per_unit.filter(|per_unit| *per_unit > 0.0);
     // What one size of the effect does to a row, relative to all rows.
     let share = |row: usize| unnamed.zip(per_unit).map_or(1.0, |(column, whole)| column[row] / whole);
+    // Of rows beside classes that are values: what moves a limit without a name need not move a frequency with it.
+    let values = ValuesBeside::of(data, sigma);
     let effect = |over, basis| per_unit.map(|per_unit| OfEffect { per_unit, over, basis });
     let mut kinds = Vec::new();
     checkpoint(monitor)?;
@@ -180,17 +183,23 @@ pub(in crate::diagnosis) fn kinds(
     }
     for grouping in &data.layout.design.groupings {
         checkpoint(monitor)?;
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        for (row, &group) in grouping.group.iter().enumerate() {
-            groups.resize(groups.len().max(group + 1), Vec::new());
-            groups[group].push(row);
-        }
+        let groups = members(&grouping.group);
         let over = varying(grouping, &data.layout.design.conditions, groups.len());
         let of_effect = over.and_then(|over| effect(over, OfBasis::Levels(grouping.group.clone())));
-        let size = |row: usize| if of_effect.is_some() { share(row) } else { 1.0 };
-        let levels = groups.iter().map(|group| Sparse::new(rows, group.iter().map(|&row| (row, size(row))))).collect();
-        let kind = Kind::levels(grouping.name, levels, likelihood, sigma);
-        kinds.push(Kind { over: grouping.over.clone(), effect: of_effect, ..kind });
+        let size = |row: usize| if of_effect.is_some() { share(row) } else { values.unit(row) };
+        let of_rows = |group: &[usize]| Sparse::new(rows, group.iter().map(|&row| (row, size(row))));
+        let mut add = |levels: Vec<Sparse>, of_effect: Option<OfEffect>| {
+            let kind = Kind::levels(grouping.name, levels, likelihood, sigma);
+            kinds.push(Kind { over: grouping.over.clone(), effect: of_effect, ..kind });
+        };
+        if !values.are_there() {
+            add(groups.iter().map(|group| of_rows(group)).collect(), of_effect);
+            continue;
+        }
+        let [of_classes, of_values] = values.apart(&groups);
+        let of_classes: Vec<Sparse> = of_classes.iter().map(|group| of_rows(group)).collect();
+        add(of_classes.iter().cloned().chain(of_values.iter().map(|group| of_rows(group))).collect(), None);
+        add(of_classes, None);
     }
     if let Some(order) = &data.layout.design.order {
         let columns = TEST_ORDERS.map(|k| on_all(&|row| cosine(k, order[row]))).collect();
@@ -202,6 +211,7 @@ pub(in crate::diagnosis) fn kinds(
         checkpoint(monitor)?;
         // So many values allow no more waves.
         let orders = 0..=CONDITION_ORDERS.min(first.levels - 1);
+        let share = |row: usize| if values.holds(row) { 0.0 } else { share(row) };
         let columns = orders.clone().map(|k| on_all(&|row| share(row) * cosine(k, first.place[row]))).collect();
         let waves: Vec<Wave> = orders.map(Wave::of).collect();
         let of_effect = effect(vec![first.name], OfBasis::Waves(vec![waves.len()]));

@@ -6,4 +6,5 @@ pub(super) mod discrepancy;
 pub(super) mod evidence;
 pub(super) mod fairness;
 pub(super) mod likelihood;
+pub(super) mod values_beside;
 pub(super) mod whiten;

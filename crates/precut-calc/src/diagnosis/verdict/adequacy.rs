@@ -1,15 +1,13 @@
 //! Is anything wrong beyond the scatter? Classical tests beside the posterior (`diagnosis/3.3`).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal};
 
-use crate::calculator::{Failure, Monitor, Smooth, checkpoint};
+use crate::calculator::{Failure, Monitor, Smooth};
 use crate::diagnosis::rows::basis::{dot, smooth_columns};
-use crate::diagnosis::rows::link;
 use crate::diagnosis::rows::noise::pure_error;
 use crate::diagnosis::rows::sparse::Sparse;
+use crate::diagnosis::verdict::class_tests::of_classes;
 use crate::diagnosis::verdict::weigh::Weighing;
 
 /// A test with its statistic and p-value.
@@ -42,6 +40,8 @@ pub enum TestKind {
     HeldOut,
     /// Of classes: minus twice the log-probability of those seen, against classes drawn from the base.
     Deviance,
+    /// Of classes: by how much that falls where the rows of every group may be off together, against the same draws.
+    Levels,
 }
 
 impl TestKind {
@@ -68,6 +68,7 @@ impl TestKind {
             Self::Runs => "runs",
             Self::HeldOut => "held_out",
             Self::Deviance => "deviance",
+            Self::Levels => "levels",
         }
     }
 }
@@ -75,7 +76,9 @@ impl TestKind {
 /// All tests that these rows allow.
 pub fn adequacy(weighing: &Weighing<'_>, monitor: &dyn Monitor) -> Result<Vec<Test>, Failure> {
     if let Some(sides) = &weighing.foundation.data.sides {
-        return Ok(deviance(weighing, sides, monitor)?.into_iter().collect());
+        let mut tests = of_classes(weighing, sides, monitor)?;
+        holm(&mut tests);
+        return Ok(tests);
     }
     let mut tests: Vec<Test> =
         [lack_of_fit(weighing), smooth_directions(weighing), ljung_box(weighing), runs(weighing), held_out(weighing)]
@@ -98,44 +101,8 @@ fn holm(tests: &mut [Test]) {
     }
 }
 
-fn test(kind: TestKind, statistic: f64, dof: (f64, Option<f64>), p: f64) -> Option<Test> {
+pub(super) fn test(kind: TestKind, statistic: f64, dof: (f64, Option<f64>), p: f64) -> Option<Test> {
     (statistic.is_finite() && p.is_finite()).then_some(Test { kind, statistic, dof, p, p_holm: p })
-}
-
-/// Draws behind the p-value of a deviance: it is known to a hundredth where it is 0.1.
-const DRAWS: usize = 2000;
-
-/// D = -2 sum of ln F(s m/sigma) of the base's margins. Its distribution is no chi-squared one for single classes, so it is
-/// drawn: allowances from their prior, classes from the margins under them. Values beside them are drawn about the base.
-fn deviance(weighing: &Weighing<'_>, sides: &[f64], monitor: &dyn Monitor) -> Result<Option<Test>, Failure> {
-    let foundation = weighing.foundation;
-    let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
-    let of = |side: f64, row: usize| -2.0 * link::log_likelihood(side, foundation.base[row] / weighing.scatter(row));
-    let found: f64 = rows.iter().map(|&row| of(sides[row], row)).sum();
-    let mut random = Pcg64::seed_from_u64(1);
-    let normal = Normal::standard();
-    let mut larger = 0.0;
-    let nuisances: Vec<Vec<f64>> = foundation.nuisances.iter().map(Sparse::dense).collect();
-    for _ in 0..DRAWS {
-        checkpoint(monitor)?;
-        let sizes: Vec<f64> =
-            nuisances.iter().map(|_| normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12))).collect();
-        let drawn: f64 = rows
-            .iter()
-            .map(|&row| {
-                let moved: f64 = sizes.iter().zip(&nuisances).map(|(size, column)| size * column[row]).sum();
-                if link::is_value(sides[row]) {
-                    let scatter = normal.inverse_cdf(random.random::<f64>().clamp(1e-12, 1.0 - 1e-12));
-                    return link::drawn_value(scatter - moved / weighing.scatter(row), random.random());
-                }
-                let positive = link::log_probability((foundation.base[row] + moved) / weighing.scatter(row)).exp();
-                of(if random.random::<f64>() < positive { 1.0 } else { -1.0 }, row)
-            })
-            .sum();
-        larger += f64::from(u8::from(drawn >= found));
-    }
-    // Counted with the rows themselves, so that it is never 0.
-    Ok(test(TestKind::Deviance, found, (rows.len() as f64, None), (larger + 1.0) / (DRAWS as f64 + 1.0)))
 }
 
 /// F = [SS_lof/c] / [SS_pe/(n - c)], c distinct conditions; the base has no fitted parameter. Of rows

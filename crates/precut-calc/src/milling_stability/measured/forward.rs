@@ -5,7 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{
     ClassLimits, Consequence, Cost, Design, Diagnosable, Example, Expansions, Failure, Finding, ForwardModel,
-    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRuns, Outlook, Prediction, PrepareError, Quantity, Ranges,
+    Rows,
 };
 use crate::effects::{Cause, MILLING_CAUSES, MillingEffect};
 
@@ -254,6 +255,15 @@ impl Diagnosable for MillingStability {
         monitor: &dyn Monitor,
     ) -> Result<NextRuns<MillingRun, MillingPoint>, Failure> {
         next_runs(job, rows, ranges, monitor)
+    }
+
+    fn outlooks(
+        prepared: &PreparedMilling,
+        allowances: &MillingAllowances,
+        effects: &[MillingEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Option<Vec<Option<Outlook>>>, Failure> {
+        prepared.outlooks(allowances, effects, monitor).map(Some)
     }
 
     fn consequences(

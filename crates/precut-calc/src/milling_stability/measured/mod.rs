@@ -5,6 +5,7 @@ mod consequence;
 mod forward;
 mod hypotheses;
 mod limits;
+mod lobes;
 mod measurement;
 mod next_runs;
 mod predict;

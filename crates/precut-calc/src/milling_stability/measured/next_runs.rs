@@ -12,7 +12,7 @@ use super::limits::first_limit_mm;
 /// Speeds at which a tooth passes once in so many oscillations of a mode, that are tried.
 const MOST_SPEEDS: usize = 8;
 /// Depths that are tried at each, as shares of the limit of the base: a cut tells most where it is not known how it goes.
-const SHARES: [f64; 2] = [0.85, 1.15];
+const SHARES: [f64; 4] = [0.75, 0.92, 1.08, 1.3];
 /// Limits are looked for up to so many times the largest depth of the log.
 const LOOKED_FOR: f64 = 3.0;
 /// Two speeds nearer than this share are one.

@@ -4,14 +4,17 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::calculator::{ClassLimits, Failure, Finding, LimitCurve, Missing, Monitor, Prediction, PrepareError, Rows};
+use crate::calculator::{
+    ClassLimits, Failure, Finding, LimitCurve, Missing, Monitor, Outlook, Prediction, PrepareError, Rows,
+};
 use crate::effects::MillingEffect;
 
 use super::super::cost::on_map_ms;
 use super::super::job::{Case, Job, beyond_modes, fits, guessed};
 use super::super::model::{Alias, Cut, Mode, Multiplier, Orders};
-use super::forward::{CutMargin, MillingPoint, MillingRun};
+use super::forward::{CutMargin, MillingAllowances, MillingPoint, MillingRun};
 use super::limits::{Look, cut_at, first_limit_mm, teeth_per_period};
+use super::lobes::limit_over_speed;
 
 /// Of the frequencies of a disturbance those count whose share is at least this times the largest: which of them sounds loudest
 /// depends on where it is heard.
@@ -19,8 +22,6 @@ const LOUD: f64 = 0.3;
 /// A cut behaves like one of a depth within its scatter, and near a depth at which another mode takes over it may sound as either: depths
 /// over its own whose frequencies count, too, two usual scatters to either side.
 const SOUNDS: [f64; 2] = [0.9, 1.1];
-/// Speeds at which a limit is drawn.
-const SPEEDS: u32 = 40;
 /// Widths and feeds whose limits are drawn.
 const MOST_CURVES: usize = 4;
 
@@ -174,21 +175,37 @@ impl PreparedMilling {
         Ok(rows.iter().map(of).collect())
     }
 
+    /// What may be seen of every row that is cut next.
+    pub(super) fn outlooks(
+        &self,
+        allowances: &MillingAllowances,
+        effects: &[MillingEffect],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Option<Outlook>>, Failure> {
+        let cases: Vec<Case> = self.cases.iter().map(|case| case.clone().with_effects(effects)).collect();
+        let of = |row: &PreparedRow| -> Result<Option<Outlook>, Failure> {
+            let Some(cut) = cut_at(&cases[row.case], row.spindle_rpm, row.depth_mm) else { return Ok(None) };
+            let Some((multiplier, aliases)) = self.orders.heard_on_map(&cut, monitor)? else { return Ok(None) };
+            let growth = multiplier.growth() / teeth_per_period(&cut);
+            Ok(Some(Outlook {
+                margin: -growth / row.steepness,
+                scatter: allowances.limit_scatter_rel,
+                heard: loud(&aliases).map(f64::ln).collect(),
+                heard_scatter: allowances.frequency_scatter_rel,
+            }))
+        };
+        self.rows.par_iter().map(of).collect()
+    }
+
     /// The multiplier of a cut and the frequencies that may be heard of it, Hz.
     fn heard(&self, cut: &Cut<'_>, monitor: &dyn Monitor) -> Result<Option<(Multiplier, Vec<f64>)>, Failure> {
         let Some((multiplier, own)) = self.orders.heard_on_map(cut, monitor)? else { return Ok(None) };
-        let mut loud = Vec::new();
         let mut each = vec![own];
         for share in SOUNDS {
             let near = Cut { depth_mm: share * cut.depth_mm, ..*cut };
             each.extend(self.orders.heard_on_map(&near, monitor)?.map(|(_, aliases)| aliases));
         }
-        for aliases in each {
-            let loudest = aliases.first().map_or(0.0, |alias| alias.share);
-            let counts = |alias: &&Alias| alias.share >= LOUD * loudest && alias.frequency_hz > 0.0;
-            loud.extend(aliases.iter().filter(counts).map(|alias| alias.frequency_hz));
-        }
-        Ok(Some((multiplier, loud)))
+        Ok(Some((multiplier, each.iter().flat_map(|aliases| loud(aliases)).collect())))
     }
 
     /// g of every row: at the largest limit of the base below the cut, else at the least one above; 1 where there is none.
@@ -229,14 +246,13 @@ impl PreparedMilling {
         let mut curves = Vec::new();
         for case in self.cases.iter().take(MOST_CURVES) {
             let case = case.clone().with_effects(effects);
-            let at = |k: u32| ends.0 * (ends.1 / ends.0).powf(f64::from(k) / f64::from(SPEEDS - 1));
-            let along: Vec<f64> = (0..SPEEDS).map(at).collect();
-            let limit = |speed: &f64| self.limit_mm(&case, *speed, most_mm, monitor);
+            let limit = |speed: f64| self.limit_mm(&case, speed, most_mm, monitor);
+            let found = limit_over_speed([ends.0, ends.1], most_mm, limit)?;
             curves.push(LimitCurve {
                 feed_mm_per_tooth: case.milling.feed_mm,
                 width_mm: Some(case.width_mm),
-                depth_mm: along.par_iter().map(limit).collect::<Result<_, _>>()?,
-                spindle_speed_rpm: along,
+                depth_mm: found.iter().map(|(_, limit)| *limit).collect(),
+                spindle_speed_rpm: found.iter().map(|(speed, _)| *speed).collect(),
                 low_mm: Vec::new(),
                 high_mm: Vec::new(),
             });
@@ -264,6 +280,13 @@ impl PreparedMilling {
         };
         self.places.iter().map(of).sum()
     }
+}
+
+/// Those of the frequencies of a disturbance that count, Hz, by falling share.
+fn loud(aliases: &[Alias]) -> impl Iterator<Item = f64> + '_ {
+    let loudest = aliases.first().map_or(0.0, |alias| alias.share);
+    let counts = move |alias: &&Alias| alias.share >= LOUD * loudest && alias.frequency_hz > 0.0;
+    aliases.iter().filter(counts).map(|alias| alias.frequency_hz)
 }
 
 /// Expected time of the prediction of one cut, ms.

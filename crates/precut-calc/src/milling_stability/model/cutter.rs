@@ -194,21 +194,19 @@ impl Milling {
 
     /// Normal of the edge toward the work.
     pub fn normal(&self, angle_rad: f64) -> Vector {
-        let ((s, c), (sin, cos)) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
-        [sin * s, sin * c, -cos]
+        normal(angle_rad.sin_cos(), self.edge_angle_rad.sin_cos())
     }
 
     /// T q/sin kappa: the force on the tool per mm of height by a force per mm of edge (`milling/2.4`).
     pub fn on_tool(&self, angle_rad: f64, per_edge: &Vector) -> Vector {
-        let ((s, c), (sin, cos)) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
-        let [t, r, a] = per_edge.map(|q| q / sin);
-        let inward = r * sin + a * cos;
-        [-t * c - inward * s, t * s - inward * c, r * cos - a * sin]
+        on_tool(angle_rad.sin_cos(), self.edge_angle_rad.sin_cos(), per_edge)
     }
 
     /// D: slope of that force over the motion of the tool against the work, N/mm per mm of height (`milling/2.5`).
     pub fn stiffness(&self, angle_rad: f64, slope: &Vector) -> Tensor {
-        let (force, normal) = (self.on_tool(angle_rad, slope), self.normal(angle_rad));
+        // At every instant of every map: sine and cosine once.
+        let (turned, edge) = (angle_rad.sin_cos(), self.edge_angle_rad.sin_cos());
+        let (force, normal) = (on_tool(turned, edge, slope), normal(turned, edge));
         force.map(|f| normal.map(|n| f * n))
     }
 
@@ -227,4 +225,16 @@ impl Milling {
             [sin * lifting * is, sin * lifting * ic, -cos * lifting * angle_rad],
         ]
     }
+}
+
+/// Normal of an edge from the sines and cosines of its angle and of kappa.
+fn normal((s, c): (f64, f64), (sin, cos): (f64, f64)) -> Vector {
+    [sin * s, sin * c, -cos]
+}
+
+/// T q/sin kappa from the same.
+fn on_tool((s, c): (f64, f64), (sin, cos): (f64, f64), per_edge: &Vector) -> Vector {
+    let [t, r, a] = per_edge.map(|q| q / sin);
+    let inward = r * sin + a * cos;
+    [-t * c - inward * s, t * s - inward * c, r * cos - a * sin]
 }

@@ -77,14 +77,25 @@ pub(super) fn shares(
     let mut pace = Pace::new(monitor);
     let mut aliases: Vec<Alias> = Vec::new();
     let mut energy = vec![0.0; structure.modes.len()];
+    // Every force turned by each term in its turn: from one to the next by one multiplication, whose round-off some hundreds of terms
+    // leave below 1e-13.
+    let turned_by = |rad_per_s: f64, time: f64| Complex::from_polar(1.0, -rad_per_s * time);
+    let lowest = (angle - TAU * f64::from(highest)) / period;
+    let mut turning: Vec<(Vec<Complex<f64>>, Complex<f64>)> = forces
+        .into_iter()
+        .map(|(time, force)| {
+            let first = turned_by(lowest, time);
+            (force.into_iter().map(|value| value * first).collect(), turned_by(TAU / period, time))
+        })
+        .collect();
     for l in -highest..=highest {
-        pace.work(40 * forces.len())?;
+        pace.work(8 * turning.len())?;
         let rad_per_s = (angle + TAU * f64::from(l)) / period;
         let mut term = vec![Complex::new(0.0, 0.0); d];
-        for (time, force) in &forces {
-            let turned = Complex::from_polar(1.0, -rad_per_s * time);
+        for (force, step) in &mut turning {
             for (sum, value) in term.iter_mut().zip(force) {
-                *sum += value * turned;
+                *sum += *value;
+                *value *= *step;
             }
         }
         let mut motion = vec![Complex::new(0.0, 0.0); d];
