@@ -1,7 +1,10 @@
 //! Parts that are judged by the limits of their diameters (`certainty/4`).
 
+use std::rc::Rc;
+
 use crate::calculator::{Failure, Monitor};
-use crate::certainty::lines::{Effort, Found, Margins, Question, Together, Values};
+use crate::certainty::bounds::Extremes;
+use crate::certainty::lines::{Effort, Estimate, Found, Margins, Question, Together, Values};
 use crate::certainty::{
     Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts, Surface,
     Uncertainties, bounded, normal_below,
@@ -29,12 +32,15 @@ const GAUGE_UM: f64 = 1.0;
 const SHIFT_STEP_UM: f64 = 10.0;
 
 /// Parts that are judged by their limits.
+#[derive(Clone)]
 pub(crate) struct Judged<'a> {
     pub(super) asked: Asked<'a>,
     pub(super) parts: &'a dyn Parts,
     pub(super) uncertainties: Uncertainties<DeflectionQuantity>,
     pub(super) limits: SizeLimits,
-    near: Near,
+    near: Rc<Near>,
+    /// Errors by station at the medians, of the command as it is.
+    stated_um: Vec<f64>,
     /// Independent scores along which what decides changes fastest.
     pub(super) axis: Vec<f64>,
     pub(super) slopes: Slopes,
@@ -50,10 +56,11 @@ pub(super) enum By {
     Surface,
 }
 
-/// Errors by station as a response surface of what the quantities come to and of the shift of the command.
+/// Errors by station as a response surface of what the quantities come to, of the places between bounds, and of the shift of the
+/// command.
 struct Near {
     surface: Surface,
-    /// What every quantity comes to at its median and how far off it is taken, the shift last.
+    /// What every quantity comes to at its median and how far off it is taken; then the places, the shift last.
     scales: Vec<(f64, f64)>,
 }
 
@@ -65,25 +72,30 @@ impl Near {
         shift_step_um: f64,
     ) -> Result<Self, Failure> {
         let mut scales = uncertainties.scales();
+        let with_distribution = scales.len();
+        scales.extend(uncertainties.within.iter().map(|_| (0.0, 1.0)));
         scales.push((0.0, shift_step_um));
         let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
         let count = scales.len() - 1;
         let surface = Surface::of(&acts, &mut |x| {
             let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
-            let values: Vec<f64> = (0..count).map(at).collect();
-            parts.errors_um(&draw_of(uncertainties, asked.effects, &values)?, at(count))
+            let values: Vec<f64> = (0..with_distribution).map(at).collect();
+            let held = uncertainties.held(&(with_distribution..count).map(at).collect::<Vec<_>>());
+            parts.errors_um(&draw_of(&held, asked.effects, &values)?, at(count))
         })?;
         Ok(Self { surface, scales })
     }
 
-    fn coordinates(&self, values: &[f64], shift_um: f64) -> Vec<f64> {
-        let of =
+    fn coordinates(&self, of: &Uncertainties<DeflectionQuantity>, values: &[f64], shift_um: f64) -> Vec<f64> {
+        let places = of.places();
+        let one =
             |(value, (median, scale)): (f64, &(f64, f64))| if *scale > 0.0 { (value - median) / scale } else { 0.0 };
-        values.iter().copied().chain([shift_um]).zip(&self.scales).map(of).collect()
+        values.iter().copied().chain(places).chain([shift_um]).zip(&self.scales).map(one).collect()
     }
 }
 
 /// Errors as they change with independent scores near the stated values.
+#[derive(Clone)]
 pub(super) struct Slopes {
     /// By station, um.
     pub(super) of_um: Vec<Vec<f64>>,
@@ -100,17 +112,26 @@ impl<'a> Judged<'a> {
     ) -> Result<Option<Self>, Failure> {
         let uncertainties = uncertainties(&asked)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
-        if uncertainties.count() == 0 || parts.places().z_mm.is_empty() {
+        if uncertainties.is_empty() || parts.places().z_mm.is_empty() {
             return Ok(None);
         }
         let limits = asked.tolerance.size();
         let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
         let near = Near::of(&asked, parts, &uncertainties, step_um)?;
         let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
-        let mut judged = Self { asked, parts, uncertainties, limits, near, axis: Vec::new(), slopes, monitor };
+        let (near, stated_um, axis) = (Rc::new(near), Vec::new(), Vec::new());
+        let judged = Self { asked, parts, uncertainties, limits, near, stated_um, axis, slopes, monitor };
+        judged.with(judged.uncertainties.clone()).map(Some)
+    }
+
+    /// The same with the quantities between bounds where they are held there.
+    pub(super) fn with(&self, uncertainties: Uncertainties<DeflectionQuantity>) -> Result<Self, Failure> {
+        let mut judged = Self { uncertainties, ..self.clone() };
+        let medians = vec![0.0; judged.uncertainties.dimensions()];
+        judged.stated_um = judged.errors_um(By::Surface, &judged.uncertainties, &medians, 0.0)?;
         judged.slopes.of_um = judged.slopes_um()?;
         judged.axis = judged.deciding();
-        Ok(Some(judged))
+        Ok(judged)
     }
 
     /// Change of the errors with every independent score, by station.
@@ -163,7 +184,7 @@ impl<'a> Judged<'a> {
         let values = of.values(independent);
         match by {
             By::Model => self.parts.errors_um(&draw_of(of, self.asked.effects, &values)?, shift_um),
-            By::Surface => Ok(self.near.surface.at(&self.near.coordinates(&values, shift_um))),
+            By::Surface => Ok(self.near.surface.at(&self.near.coordinates(of, &values, shift_um))),
         }
     }
 
@@ -183,7 +204,7 @@ impl<'a> Judged<'a> {
 
     /// Errors by station as they are stated.
     pub(super) fn stated_um(&self) -> &[f64] {
-        self.near.surface.at_point()
+        &self.stated_um
     }
 
     /// By how much the limits are kept, um.
@@ -251,7 +272,8 @@ impl<'a> Judged<'a> {
 
     fn linear_probability(&self) -> Result<f64, Failure> {
         let found = self.question(&self.axis, MOST_LINES[1]).of(&mut |g: &[f64]| {
-            let coordinates = self.near.coordinates(&self.uncertainties.values(g), 0.0);
+            let of = &self.uncertainties;
+            let coordinates = self.near.coordinates(of, &of.values(g), 0.0);
             Ok(self.margins(self.parts.places().extremes_um(&self.near.surface.linear_at(&coordinates))))
         })?;
         Ok(found.of[JOINT].probability)
@@ -289,8 +311,39 @@ impl<'a> Judged<'a> {
         axis
     }
 
+    /// Where within bounds the probability is least and most, of a command that is larger by `shift_um`; `None` where there are none.
+    fn extremes(&self, shift_um: f64) -> Result<Option<Extremes>, Failure> {
+        self.uncertainties.extremes(&mut |of| Ok(self.with(of.clone())?.nearly(of, shift_um)?[JOINT]))
+    }
+
+    /// What the probabilities of the response surface are worth, within bounds the least.
+    pub(super) fn worth_nearly(&self, shift_um: f64, worth: &dyn Fn([f64; SETS.len()]) -> f64) -> Result<f64, Failure> {
+        let at = |of: &Uncertainties<DeflectionQuantity>| Ok(worth(self.with(of.clone())?.nearly(of, shift_um)?));
+        match self.uncertainties.extremes(&mut { at })? {
+            Some(extremes) => at(&self.uncertainties.held(&extremes.least)),
+            None => Ok(worth(self.nearly(&self.uncertainties, shift_um)?)),
+        }
+    }
+
+    /// The probability of all limits, within bounds the least.
+    pub(super) fn least_found(&self, shift_um: f64) -> Result<Estimate, Failure> {
+        match self.extremes(shift_um)? {
+            Some(extremes) => Ok(self.with(self.uncertainties.held(&extremes.least))?.found(shift_um)?.of[JOINT]),
+            None => Ok(self.found(shift_um)?.of[JOINT]),
+        }
+    }
+
     /// The whole block, of a command that is larger by `shift_um` than the exact one.
     pub(crate) fn conformance(&self, shift_um: f64) -> Result<Conformance, Failure> {
+        let Some(Extremes { least, most, search }) = self.extremes(shift_um)? else { return self.told(shift_um) };
+        let [least, most] = [least, most].map(|places| self.with(self.uncertainties.held(&places)));
+        let mut told = least?.told(shift_um)?;
+        told.joint = told.joint.least(most?.found(shift_um)?.of[JOINT].probability, search);
+        Ok(told)
+    }
+
+    /// The block with the quantities between bounds where they are.
+    fn told(&self, shift_um: f64) -> Result<Conformance, Failure> {
         let uncertainty = self.asked.uncertainty;
         let found = self.found(shift_um)?;
         let joint = found.of[JOINT];
@@ -318,17 +371,16 @@ impl<'a> Judged<'a> {
                 joint_probability_if_halved: Some(told(&halved)?),
             });
         }
+        contributions.extend(
+            self.uncertainties
+                .contributions_within(joint.probability, &mut |of| Ok(self.nearly(of, shift_um)?[JOINT]))?,
+        );
         Contribution::sort(&mut contributions);
         let common = self.common_share();
         let probability = bounded(joint.probability);
         Ok(Conformance {
             limits: self.limits_kept(&found),
-            joint: JointlyKept {
-                probability,
-                numerical_error: joint.error,
-                wanted: uncertainty.wanted_probability,
-                met: probability >= uncertainty.wanted_probability,
-            },
+            joint: JointlyKept::of(joint, uncertainty.wanted_probability),
             setup: SeveralParts {
                 count: uncertainty.parts_per_setup,
                 probability_all_good: self.all_good(probability),

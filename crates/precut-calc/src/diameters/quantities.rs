@@ -223,8 +223,8 @@ pub(super) fn draw_of(
     values: &[f64],
 ) -> Result<Draw, Failure> {
     let mut draw = Draw { effects: of.effects.effects(effects, of.of_effects(values))?, ..Draw::STATED };
-    for (one, value) in of.of.iter().zip(values) {
-        one.quantity.put(*value, &mut draw);
+    for (quantity, value) in of.drawn(values) {
+        quantity.put(value, &mut draw);
     }
     Ok(draw)
 }
@@ -304,7 +304,7 @@ pub(crate) fn check(asked: &Asked<'_>, violations: &mut Violations) {
     check_quantities(&quantities, violations);
     certainty::open::check(asked.effects, &stated.effects, violations);
     check_brought(quantities.iter().map(|(quantity, _)| *quantity), |one| one.is_brought(asked), violations);
-    check_correlations(&pairs(stated), || uncertainties(asked).err(), violations);
+    check_correlations(&pairs(stated), &quantities, || uncertainties(asked).err(), violations);
 }
 
 fn check_limits(tolerance: &Tolerance, violations: &mut Violations) {
