@@ -107,6 +107,8 @@ pub enum Level {
     Setup,
     /// New for every part.
     Part,
+    /// New at every place along every part, alike at places that are near each other.
+    Place,
 }
 
 /// Where a distribution is from.

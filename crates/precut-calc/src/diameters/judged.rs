@@ -11,7 +11,7 @@ use crate::certainty::{
 };
 
 use super::limits::SizeLimits;
-use super::quantities::{DeflectionQuantity, draw_of, uncertainties};
+use super::quantities::{Modes, OneQuantity, draw_of, uncertainties};
 use super::{Asked, Parts, Places};
 
 /// Upper and lower limit of size, and form.
@@ -36,8 +36,9 @@ const SHIFT_STEP_UM: f64 = 10.0;
 pub(crate) struct Judged<'a> {
     pub(super) asked: Asked<'a>,
     pub(super) parts: &'a dyn Parts,
-    pub(super) uncertainties: Uncertainties<DeflectionQuantity>,
+    pub(super) uncertainties: Uncertainties<OneQuantity>,
     pub(super) limits: SizeLimits,
+    modes: Rc<Modes>,
     near: Rc<Near>,
     /// Errors by station at the medians, of the command as it is.
     stated_um: Vec<f64>,
@@ -68,7 +69,7 @@ impl Near {
     fn of(
         asked: &Asked<'_>,
         parts: &dyn Parts,
-        uncertainties: &Uncertainties<DeflectionQuantity>,
+        (uncertainties, modes): (&Uncertainties<OneQuantity>, &Modes),
         shift_step_um: f64,
     ) -> Result<Self, Failure> {
         let mut scales = uncertainties.scales();
@@ -77,16 +78,18 @@ impl Near {
         scales.push((0.0, shift_step_um));
         let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
         let count = scales.len() - 1;
-        let surface = Surface::of(&acts, &mut |x| {
+        // Errors along the part add to each other.
+        let is_mode = |i: usize| uncertainties.of.get(i).is_some_and(|one| one.quantity.is_mode());
+        let surface = Surface::crossed(&acts, &|i, j| !(is_mode(i) && is_mode(j)), &mut |x| {
             let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
             let values: Vec<f64> = (0..with_distribution).map(at).collect();
             let held = uncertainties.held(&(with_distribution..count).map(at).collect::<Vec<_>>());
-            parts.errors_um(&draw_of(&held, asked.effects, &values)?, at(count))
+            parts.errors_um(&draw_of((&held, modes), asked.effects, &values)?, at(count))
         })?;
         Ok(Self { surface, scales })
     }
 
-    fn coordinates(&self, of: &Uncertainties<DeflectionQuantity>, values: &[f64], shift_um: f64) -> Vec<f64> {
+    fn coordinates(&self, of: &Uncertainties<OneQuantity>, values: &[f64], shift_um: f64) -> Vec<f64> {
         let places = of.places();
         let one =
             |(value, (median, scale)): (f64, &(f64, f64))| if *scale > 0.0 { (value - median) / scale } else { 0.0 };
@@ -110,22 +113,22 @@ impl<'a> Judged<'a> {
         parts: &'a dyn Parts,
         monitor: &'a dyn Monitor,
     ) -> Result<Option<Self>, Failure> {
-        let uncertainties = uncertainties(&asked)
+        let (uncertainties, modes) = uncertainties(&asked, &parts.places().z_mm)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
         if uncertainties.is_empty() || parts.places().z_mm.is_empty() {
             return Ok(None);
         }
         let limits = asked.tolerance.size();
         let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
-        let near = Near::of(&asked, parts, &uncertainties, step_um)?;
+        let near = Near::of(&asked, parts, (&uncertainties, &modes), step_um)?;
         let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
-        let (near, stated_um, axis) = (Rc::new(near), Vec::new(), Vec::new());
-        let judged = Self { asked, parts, uncertainties, limits, near, stated_um, axis, slopes, monitor };
+        let (modes, near, stated_um, axis) = (Rc::new(modes), Rc::new(near), Vec::new(), Vec::new());
+        let judged = Self { asked, parts, uncertainties, limits, modes, near, stated_um, axis, slopes, monitor };
         judged.with(judged.uncertainties.clone()).map(Some)
     }
 
     /// The same with the quantities between bounds where they are held there.
-    pub(super) fn with(&self, uncertainties: Uncertainties<DeflectionQuantity>) -> Result<Self, Failure> {
+    pub(super) fn with(&self, uncertainties: Uncertainties<OneQuantity>) -> Result<Self, Failure> {
         let mut judged = Self { uncertainties, ..self.clone() };
         let medians = vec![0.0; judged.uncertainties.dimensions()];
         judged.stated_um = judged.errors_um(By::Surface, &judged.uncertainties, &medians, 0.0)?;
@@ -177,13 +180,13 @@ impl<'a> Judged<'a> {
     pub(super) fn errors_um(
         &self,
         by: By,
-        of: &Uncertainties<DeflectionQuantity>,
+        of: &Uncertainties<OneQuantity>,
         independent: &[f64],
         shift_um: f64,
     ) -> Result<Vec<f64>, Failure> {
         let values = of.values(independent);
         match by {
-            By::Model => self.parts.errors_um(&draw_of(of, self.asked.effects, &values)?, shift_um),
+            By::Model => self.parts.errors_um(&draw_of((of, &self.modes), self.asked.effects, &values)?, shift_um),
             By::Surface => Ok(self.near.surface.at(&self.near.coordinates(of, &values, shift_um))),
         }
     }
@@ -220,7 +223,7 @@ impl<'a> Judged<'a> {
     pub(super) fn cut(
         &self,
         by: By,
-        of: &Uncertainties<DeflectionQuantity>,
+        of: &Uncertainties<OneQuantity>,
         independent: &[f64],
         shift_um: f64,
     ) -> Result<Margins<LIMITS>, Failure> {
@@ -260,11 +263,7 @@ impl<'a> Judged<'a> {
     }
 
     /// The probabilities by the response surface alone, on few lines: for comparisons on the same ones.
-    pub(super) fn nearly(
-        &self,
-        of: &Uncertainties<DeflectionQuantity>,
-        shift_um: f64,
-    ) -> Result<[f64; SETS.len()], Failure> {
+    pub(super) fn nearly(&self, of: &Uncertainties<OneQuantity>, shift_um: f64) -> Result<[f64; SETS.len()], Failure> {
         let question = self.question(&self.axis, MOST_LINES[1]);
         let found = question.of(&mut |g: &[f64]| self.cut(By::Surface, of, g, shift_um))?;
         Ok(found.of.map(|one| one.probability))
@@ -318,7 +317,7 @@ impl<'a> Judged<'a> {
 
     /// What the probabilities of the response surface are worth, within bounds the least.
     pub(super) fn worth_nearly(&self, shift_um: f64, worth: &dyn Fn([f64; SETS.len()]) -> f64) -> Result<f64, Failure> {
-        let at = |of: &Uncertainties<DeflectionQuantity>| Ok(worth(self.with(of.clone())?.nearly(of, shift_um)?));
+        let at = |of: &Uncertainties<OneQuantity>| Ok(worth(self.with(of.clone())?.nearly(of, shift_um)?));
         match self.uncertainties.extremes(&mut { at })? {
             Some(extremes) => at(&self.uncertainties.held(&extremes.least)),
             None => Ok(worth(self.nearly(&self.uncertainties, shift_um)?)),
@@ -349,7 +348,7 @@ impl<'a> Judged<'a> {
         let joint = found.of[JOINT];
         // What something else makes of it is compared on the same lines.
         let now = self.nearly(&self.uncertainties, shift_um)?[JOINT];
-        let told = |of: &Uncertainties<DeflectionQuantity>| -> Result<f64, Failure> {
+        let told = |of: &Uncertainties<OneQuantity>| -> Result<f64, Failure> {
             Ok(bounded(joint.probability + self.nearly(of, shift_um)?[JOINT] - now))
         };
         let mut advice: Vec<Improvement> = Vec::new();

@@ -7,7 +7,7 @@ use crate::certainty::lines::points;
 use crate::certainty::{OpenEffects, Uncertainties};
 use crate::effects::DeflectionEffect;
 
-use super::quantities::{DeflectionQuantity, draw_of, uncertainties};
+use super::quantities::{Modes, OneQuantity, draw_of, uncertainties};
 use super::{Asked, Parts};
 
 /// Most quantities of which bounds alone are known: all their ends are tried.
@@ -21,7 +21,7 @@ pub(crate) fn kept(
     effects: &[Vec<DeflectionEffect>],
     monitor: &dyn Monitor,
 ) -> Result<Option<Vec<bool>>, Failure> {
-    let of = uncertainties(asked)
+    let (of, modes) = uncertainties(asked, &parts.places().z_mm)
         .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
     // What is not known of the effects is in the effects.
     let of = Uncertainties { effects: OpenEffects::default(), ..of };
@@ -33,7 +33,7 @@ pub(crate) fn kept(
     let mut least: Option<Vec<bool>> = None;
     for corner in 0..1_usize << count {
         let held = of.held(&(0..count).map(|index| end(corner, index)).collect::<Vec<_>>());
-        let kept = kept_of(parts, asked, &held, effects, monitor)?;
+        let kept = kept_of(parts, asked, (&held, &modes), effects, monitor)?;
         let good = |kept: &[bool]| kept.iter().filter(|good| **good).count();
         if least.as_ref().is_none_or(|least| good(&kept) < good(least)) {
             least = Some(kept);
@@ -45,7 +45,7 @@ pub(crate) fn kept(
 fn kept_of(
     parts: &(dyn Parts + Sync),
     asked: &Asked<'_>,
-    of: &Uncertainties<DeflectionQuantity>,
+    (of, modes): (&Uncertainties<OneQuantity>, &Modes),
     effects: &[Vec<DeflectionEffect>],
     monitor: &dyn Monitor,
 ) -> Result<Vec<bool>, Failure> {
@@ -55,7 +55,7 @@ fn kept_of(
         .zip(scores)
         .map(|(effects, scores)| {
             checkpoint(monitor)?;
-            let mut draw = draw_of(of, &[], &of.values(&scores))?;
+            let mut draw = draw_of((of, modes), &[], &of.values(&scores))?;
             draw.effects = Some(effects.clone());
             match parts.errors_um(&draw, 0.0) {
                 Ok(errors_um) => Ok(asked.tolerance.holds(parts.places().extremes_um(&errors_um))),
