@@ -32,7 +32,7 @@ fn meant(case: &Value, aim: &str) -> Value {
     job
 }
 
-fn number(value: &Value, pointer: &str) -> f64 {
+pub(crate) fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
 }
 
@@ -83,7 +83,7 @@ fn the_best_aim_is_that_of_the_reference() {
 }
 
 /// A shaft between centres of which size and form matter, and what is uncertain.
-fn job(quantities: &Value, tolerance: &Value) -> Value {
+pub(crate) fn job(quantities: &Value, tolerance: &Value) -> Value {
     json!({
         "shaft": { "segments": [{ "length_mm": 600, "diameter_mm": 40, "stock_diameter_mm": 41 }],
                    "youngs_modulus_n_per_mm2": 210_000.0 },
@@ -114,7 +114,7 @@ fn one_normal_quantity_has_the_closed_form() {
     }
 }
 
-fn below(x: f64) -> f64 {
+pub(crate) fn below(x: f64) -> f64 {
     0.5 * statrs::function::erf::erfc(-x / std::f64::consts::SQRT_2)
 }
 

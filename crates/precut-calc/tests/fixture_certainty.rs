@@ -9,13 +9,13 @@ use crate::fixture_support::{checked, outcome, with};
 use precut_calc::fixture_stability::{FixtureOutcome, multiplier_modulus};
 use serde_json::{Value, json};
 
-fn reference(name: &str) -> Value {
+pub(crate) fn reference(name: &str) -> Value {
     let path = format!("{}/reference/certainty/{name}.json", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// The job of a case as it is meant: what it states alone is uncertain, its friction is one number.
-fn meant(case: &Value) -> Value {
+pub(crate) fn meant(case: &Value) -> Value {
     let mut job = case["job"].clone();
     job["uncertainty"]["defaults"] = json!(false);
     if let Some(friction) = job.pointer("/fixture/clamp/friction").cloned() {
@@ -35,7 +35,7 @@ fn number(value: &Value, pointer: &str) -> f64 {
 }
 
 /// The probability of a limit, and of all, with their errors.
-fn told(of: &FixtureOutcome, limit: &str) -> (f64, f64) {
+pub(crate) fn told(of: &FixtureOutcome, limit: &str) -> (f64, f64) {
     let conformance = of.conformance.as_ref().unwrap();
     if limit == "all" {
         return (conformance.joint.probability, conformance.joint.numerical_error);

@@ -10,6 +10,8 @@ mod beam_support;
 mod blind_trials;
 mod cancellation;
 mod cases;
+mod certainty_along;
+mod certainty_of_bounds;
 mod certainty_of_models;
 mod clamping;
 mod compliance_fit;

@@ -10,7 +10,7 @@ use precut_calc::certainty::Source;
 use precut_calc::milling_stability::{MillingConformance, Outcome};
 use serde_json::{Value, json};
 
-fn conformance(job: &Value) -> MillingConformance {
+pub(crate) fn conformance(job: &Value) -> MillingConformance {
     solve(job).outcome.conformance.unwrap()
 }
 
@@ -19,7 +19,7 @@ fn lognormal(quantity: &str, log_standard_deviation: f64) -> Value {
 }
 
 /// The example with other questions.
-fn how_sure(patch: &Value) -> Value {
+pub(crate) fn how_sure(patch: &Value) -> Value {
     merged(merged(example("how_sure"), &json!({ "analyses": ["certainty"] })), patch)
 }
 

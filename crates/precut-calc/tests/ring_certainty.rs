@@ -67,7 +67,7 @@ fn job(truth: &Truth) -> Value {
 const TOOL_DEG: f64 = 0.6;
 const WAVES: f64 = 0.3;
 
-fn certain(tolerance_um: f64) -> Value {
+pub(crate) fn certain(tolerance_um: f64) -> Value {
     let mut job = job(&STATED);
     job["analyses"] = json!(["certainty"]);
     job["tolerance"] = json!({ "roundness_um": tolerance_um });
@@ -78,7 +78,7 @@ fn certain(tolerance_um: f64) -> Value {
     job
 }
 
-fn conformance(job: &Value) -> RingConformance {
+pub(crate) fn conformance(job: &Value) -> RingConformance {
     run(job).output.conformance.unwrap()
 }
 

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Finding, Message};
 
 use super::lines::Estimate;
-use super::{Level, Source, bounded, open};
+use super::{Level, Quantity, Source, Uncertain, bounded, open};
 
 /// How probable it is that a part is good, what makes that uncertain and what would help.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -85,9 +85,15 @@ pub struct LimitKept {
 /// The probability that all limits are kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct JointlyKept {
-    /// Probability that a part is good, between 1e-6 and 1 - 1e-6.
+    /// Probability that a part is good, between 1e-6 and 1 - 1e-6. Where bounds alone are known of a quantity it is the least within
+    /// them, as is every other probability of the answer.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub probability: f64,
+    /// Largest probability within the bounds; null where every quantity has a distribution.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub probability_most: Option<f64>,
+    /// How least and most were looked for within the bounds; null where every quantity has a distribution.
+    pub interval_search: Option<IntervalSearch>,
     /// Twice the standard error of the probability.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub numerical_error: f64,
@@ -96,6 +102,16 @@ pub struct JointlyKept {
     pub wanted: f64,
     /// Whether it is reached.
     pub met: bool,
+}
+
+/// How the least and the largest probability within bounds were looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum IntervalSearch {
+    /// At the ends alone: on every line that was looked at the probability rises or falls all along with each of the quantities.
+    Ends,
+    /// From several starts, along one quantity after the other: within the bounds, too. It may miss a narrow stretch.
+    MultiStart,
 }
 
 /// Several parts of one set-up.
@@ -125,7 +141,7 @@ pub struct Contribution {
     pub source: Source,
     /// Among what it varies.
     pub level: Level,
-    /// Share of the variance of what decides, to first order; null where quantities are correlated.
+    /// Share of the variance of what decides, to first order; null where quantities are correlated, and where bounds alone are known.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub share_of_variance: Option<f64>,
     /// Probability of all limits with half of its width, all else equal; null where that would take long and nobody asked.
@@ -148,10 +164,23 @@ impl LimitKept {
 }
 
 impl JointlyKept {
+    /// The same as the least within bounds.
+    pub(crate) fn least(self, most: f64, search: IntervalSearch) -> Self {
+        let most = bounded(most).max(self.probability);
+        Self { probability_most: Some(most), interval_search: Some(search), ..self }
+    }
+
     /// Against the probability that is wanted.
     pub(crate) fn of(found: Estimate, wanted: f64) -> Self {
         let probability = bounded(found.probability);
-        Self { probability, numerical_error: found.error, wanted, met: probability >= wanted }
+        Self {
+            probability,
+            probability_most: None,
+            interval_search: None,
+            numerical_error: found.error,
+            wanted,
+            met: probability >= wanted,
+        }
     }
 }
 
@@ -166,10 +195,19 @@ pub(crate) fn probably(
         .with("percent", 100.0 * joint.probability)
         .with("wanted_percent", 100.0 * joint.wanted)
         .with("met", if joint.met { "yes" } else { "no" });
+    said = with_most(said, joint);
     if let Some(least) = limits.iter().min_by(|a, b| a.probability.total_cmp(&b.probability)) {
         said = said.with("limit", least.limit.clone()).with("limit_percent", 100.0 * least.probability);
     }
     with_largest(said, contributions)
+}
+
+/// A sentence that tells the largest probability, too, where bounds alone are known of a quantity.
+pub(crate) fn with_most(said: Message, joint: &JointlyKept) -> Message {
+    match joint.probability_most {
+        Some(most) => said.with("most_percent", 100.0 * most),
+        None => said,
+    }
 }
 
 /// A sentence that names what makes most of the doubt: a quantity, or an effect of which something is not known. Where quantities go
@@ -195,6 +233,17 @@ pub(crate) fn improbable(code: &'static str, joint: &JointlyKept) -> Option<Find
 }
 
 impl Contribution {
+    /// That of a quantity of which bounds alone are known: it has no share of a variance.
+    pub(crate) fn within<Q: Quantity>(of: &Uncertain<Q>, halved: f64) -> Self {
+        Self {
+            quantity: of.quantity.name().to_owned(),
+            source: of.source,
+            level: of.level,
+            share_of_variance: None,
+            joint_probability_if_halved: Some(halved),
+        }
+    }
+
     /// The largest share first; where none has a share, what would help most.
     pub(crate) fn sort(all: &mut [Self]) {
         let of = |one: &Self| one.share_of_variance.or(one.joint_probability_if_halved);

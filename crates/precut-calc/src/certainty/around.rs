@@ -46,7 +46,7 @@ pub(crate) struct Around<'a, Q, const K: usize, const S: usize> {
 }
 
 impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
-    /// At least one quantity is uncertain.
+    /// Quantities between bounds are held where they are.
     pub(crate) fn of(asked: Asked<'a, Q, K, S>) -> Result<Self, Failure> {
         let scale = |one: &Uncertain<Q>| 0.5 * (one.distribution.at(1.0) / one.distribution.at(-1.0)).ln();
         let scales: Vec<(f64, f64)> =
@@ -118,6 +118,13 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         let all = found.of[S - 1].probability;
         found.of.iter_mut().for_each(|of| of.probability = of.probability.max(all));
         Ok(found)
+    }
+
+    /// The probability of all limits by the response surface alone.
+    pub(crate) fn nearly(&self) -> Result<f64, Failure> {
+        let of = self.asked.uncertainties;
+        let mut near = |g: &[f64]| Ok(self.near(of, g, true));
+        Ok(self.question(self.asked.most_lines[0]).of(&mut near)?.of[S - 1].probability)
     }
 
     /// The probability of all limits by a straight model.

@@ -42,7 +42,7 @@ pub(crate) trait Block {
     ) {
         let stated = self.stated();
         check_quantities(&stated, violations);
-        check_correlations(&self.pairs(), contradiction, violations);
+        check_correlations(&self.pairs(), &stated, contradiction, violations);
         check_presence(stated.iter().map(|(quantity, _)| *quantity), missing_in, violations);
     }
 }

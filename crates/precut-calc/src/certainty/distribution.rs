@@ -71,6 +71,22 @@ pub enum Distribution {
         #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("w"))))]
         half_width_deg: Option<f64>,
     },
+    /// Bounds alone: anything within a width to either side, with no distribution. The answer then has the least and the largest
+    /// probability within them.
+    Interval {
+        /// Half of the width of a factor.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 99.0, example = 15.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("w"))))]
+        half_width_percent: Option<f64>,
+        /// Half of the width of an addition.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 100_000.0, example = 60.0, extensions(("x-unit" = json!("um")), ("x-symbol" = json!("w"))))]
+        half_width_um: Option<f64>,
+        /// Half of the width of an angle.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schema(minimum = 0.0, maximum = 10.0, example = 0.2, extensions(("x-unit" = json!("deg")), ("x-symbol" = json!("w"))))]
+        half_width_deg: Option<f64>,
+    },
     /// Student's, as few measured values give it.
     StudentT {
         /// Scale of an addition: its standard uncertainty but for the tails.
@@ -91,6 +107,8 @@ pub enum Level {
     Setup,
     /// New for every part.
     Part,
+    /// New at every place along every part, alike at places that are near each other.
+    Place,
 }
 
 /// Where a distribution is from.
@@ -170,7 +188,8 @@ impl Distribution {
                 standard_uncertainty_deg: deg,
             }
             | Self::Uniform { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
-            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
+            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
+            | Self::Interval { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
                 of(percent, um, deg)
             }
             Self::Lognormal { .. } => unit == WidthUnit::Percent,
@@ -187,7 +206,13 @@ impl Distribution {
         }
     }
 
-    /// The factor, or the addition in the unit of the quantity, at a standard normal score.
+    /// Whether there is none: bounds alone are known.
+    pub(crate) fn is_interval(&self) -> bool {
+        matches!(self, Self::Interval { .. })
+    }
+
+    /// The factor, or the addition in the unit of the quantity, at a standard normal score; of an interval at a place between
+    /// its ends, which are at -1 and 1.
     pub(crate) fn at(&self, score: f64) -> f64 {
         match *self {
             Self::Normal { standard_uncertainty_percent: Some(percent), .. } => {
@@ -204,6 +229,9 @@ impl Distribution {
             Self::Triangular { half_width_percent, half_width_um: um, half_width_deg: deg } => {
                 within(half_width_percent, um.or(deg), peaked(score))
             }
+            Self::Interval { half_width_percent, half_width_um: um, half_width_deg: deg } => {
+                within(half_width_percent, um.or(deg), score.clamp(-1.0, 1.0))
+            }
             Self::StudentT { standard_uncertainty_um, degrees_of_freedom } => {
                 standard_uncertainty_um * student(score, degrees_of_freedom)
             }
@@ -215,14 +243,19 @@ impl Distribution {
         (self.at(1.0) - self.at(-1.0)).abs() > 0.0
     }
 
-    /// Relative standard deviation of a factor, that of its logarithm where that is normal.
+    /// Relative standard deviation of a factor, that of its logarithm where that is normal; of bounds alone half of their width.
     pub(crate) fn relative(&self) -> f64 {
         match *self {
-            Self::Normal { standard_uncertainty_percent: Some(percent), .. } => percent / 100.0,
+            Self::Normal { standard_uncertainty_percent: Some(percent), .. }
+            | Self::Interval { half_width_percent: Some(percent), .. } => percent / 100.0,
             Self::Uniform { half_width_percent: Some(percent), .. } => percent / 100.0 / 3.0_f64.sqrt(),
             Self::Triangular { half_width_percent: Some(percent), .. } => percent / 100.0 / 6.0_f64.sqrt(),
             Self::Lognormal { log_standard_deviation } => log_standard_deviation,
-            Self::Normal { .. } | Self::Uniform { .. } | Self::Triangular { .. } | Self::StudentT { .. } => 0.0,
+            Self::Normal { .. }
+            | Self::Uniform { .. }
+            | Self::Triangular { .. }
+            | Self::Interval { .. }
+            | Self::StudentT { .. } => 0.0,
         }
     }
 
@@ -237,7 +270,8 @@ impl Distribution {
                 standard_uncertainty_deg: deg,
             }
             | Self::Uniform { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
-            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
+            | Self::Triangular { half_width_percent: percent, half_width_um: um, half_width_deg: deg }
+            | Self::Interval { half_width_percent: percent, half_width_um: um, half_width_deg: deg } => {
                 half(percent);
                 half(um);
                 half(deg);

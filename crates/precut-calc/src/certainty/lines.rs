@@ -394,16 +394,16 @@ impl Frame {
         let mut axis: Vec<f64> = axis.iter().map(|a| a / length).collect();
         if length.is_nan() || length <= 0.0 {
             axis.fill(0.0);
-            axis[0] = 1.0;
+            axis.iter_mut().take(1).for_each(|first| *first = 1.0);
         }
         let mut mirror = axis.clone();
-        mirror[0] -= 1.0;
+        mirror.iter_mut().take(1).for_each(|first| *first -= 1.0);
         Self { axis, mirror }
     }
 
     /// Whether there is nothing across the axis.
     fn is_a_line(&self) -> bool {
-        self.axis.len() == 1
+        self.axis.len() <= 1
     }
 
     /// Where the line of that index crosses the plane across the axis.

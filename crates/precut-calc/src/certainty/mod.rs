@@ -7,6 +7,7 @@
 mod answer;
 pub(crate) mod around;
 pub(crate) mod block;
+pub(crate) mod bounds;
 pub(crate) mod deepest;
 mod distribution;
 mod line;
@@ -18,9 +19,10 @@ mod scores;
 mod surface;
 
 pub use answer::{
-    Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, LimitKept, SeveralParts,
+    Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, IntervalSearch, JointlyKept, LimitKept,
+    SeveralParts,
 };
-pub(crate) use answer::{improbable, probably, with_largest};
+pub(crate) use answer::{improbable, probably, with_largest, with_most};
 pub(crate) use block::{Block, uncertainty_block};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};

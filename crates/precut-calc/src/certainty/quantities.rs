@@ -5,7 +5,8 @@ use crate::calculator::{Finding, Violations};
 use super::{Contradiction, Distribution, Level, OpenEffects, Scores, Source, WidthUnit};
 
 /// Codes of the faults found here.
-pub(crate) const CODES: &[&str] = &["duplicate_quantity", "bad_correlation", "correlations_contradict"];
+pub(crate) const CODES: &[&str] =
+    &["duplicate_quantity", "bad_correlation", "interval_correlated", "correlations_contradict"];
 
 /// What may be uncertain in the jobs of a calculator.
 pub(crate) trait Quantity: Copy + PartialEq {
@@ -24,15 +25,31 @@ pub(crate) struct Uncertain<Q> {
     pub source: Source,
 }
 
+/// A quantity of which bounds alone are known, at a place between them (`certainty/1.2`).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Within<Q> {
+    pub of: Uncertain<Q>,
+    /// From -1, the lower end, to 1.
+    pub place: f64,
+}
+
+impl<Q: Copy> Within<Q> {
+    fn value(&self) -> (Q, f64) {
+        (self.of.quantity, self.of.distribution.at(self.place))
+    }
+}
+
 /// How two quantities go together: which, and the correlation of their scores.
 pub(crate) type Pair<'a, Q> = (&'a [Q], f64);
 
-/// All quantities of a job that are uncertain, and how they go together: its own, then the modes of what is not known of its effects.
+/// All quantities of a job that are uncertain, and how they go together: its own, then the modes of what is not known of its effects;
+/// beside them those that are held at a place between bounds.
 #[derive(Debug, Clone)]
 pub(crate) struct Uncertainties<Q> {
     pub of: Vec<Uncertain<Q>>,
     pub scores: Scores,
     pub effects: OpenEffects,
+    pub within: Vec<Within<Q>>,
 }
 
 /// What is told of a quantity, or of a mode of one.
@@ -52,6 +69,8 @@ impl<Q: Quantity> Uncertainties<Q> {
     where
         Q: 'a,
     {
+        let (within, of): (Vec<_>, Vec<_>) = of.into_iter().partition(|one| one.distribution.is_interval());
+        let within = within.into_iter().map(|of| Within { of, place: 0.0 }).collect();
         let place = |quantity| of.iter().position(|one: &Uncertain<Q>| one.quantity == quantity);
         let pairs: Vec<(usize, usize, f64)> = pairs
             .into_iter()
@@ -61,7 +80,7 @@ impl<Q: Quantity> Uncertainties<Q> {
             })
             .collect();
         let scores = Scores::new(of.len(), &pairs)?;
-        Ok(Self { of, scores, effects: OpenEffects::default() })
+        Ok(Self { of, scores, effects: OpenEffects::default(), within })
     }
 
     /// The same with what is not known of effects.
@@ -69,7 +88,30 @@ impl<Q: Quantity> Uncertainties<Q> {
         Self { effects, ..self }
     }
 
-    /// Quantities, each mode of what is not known of effects counted.
+    /// The same with the quantities of which bounds alone are known at these places, each between -1 and 1.
+    pub(crate) fn held(&self, places: &[f64]) -> Self {
+        let mut held = self.clone();
+        held.within.iter_mut().zip(places).for_each(|(one, place)| one.place = *place);
+        held
+    }
+
+    /// Where those are held.
+    pub(crate) fn places(&self) -> Vec<f64> {
+        self.within.iter().map(|one| one.place).collect()
+    }
+
+    /// Whether all is known.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.count() == 0 && self.within.is_empty()
+    }
+
+    /// What the quantities of the job come to, those between bounds included; `values` are those of all others.
+    pub(crate) fn drawn(&self, values: &[f64]) -> impl Iterator<Item = (Q, f64)> {
+        let own = self.of.iter().zip(values).map(|(one, value)| (one.quantity, *value));
+        own.chain(self.within.iter().map(Within::value))
+    }
+
+    /// Quantities with a distribution, each mode of what is not known of effects counted.
     pub(crate) fn count(&self) -> usize {
         self.of.len() + self.effects.count()
     }
@@ -190,6 +232,7 @@ pub(crate) fn check_presence<Q: Quantity>(
 /// Finds what cannot be in its correlations; `contradiction` is what [`Uncertainties::new`] says of them.
 pub(crate) fn check_correlations<Q: Quantity>(
     pairs: &[Pair<'_, Q>],
+    stated: &[(Q, &Distribution)],
     contradiction: impl FnOnce() -> Option<Contradiction>,
     violations: &mut Violations,
 ) {
@@ -204,6 +247,14 @@ pub(crate) fn check_correlations<Q: Quantity>(
                 .with("one", one.name())
                 .with("other", other.name())
         });
+        let is_interval = |quantity: &Q| stated.iter().any(|(own, is)| own == quantity && is.is_interval());
+        if let Some(interval) = [one, other].into_iter().find(is_interval) {
+            are_pairs = false;
+            violations.add(
+                Finding::new("interval_correlated", format!("/uncertainty/correlations/{i}/between"))
+                    .with("quantity", interval.name()),
+            );
+        }
     }
     if are_pairs && let Some(Contradiction { largest_factor }) = contradiction() {
         violations.add(

@@ -32,6 +32,15 @@ impl Surface {
     /// Of a model about 0, with steps of one in those coordinates that `acts` names: 1 + 2 n + n (n - 1)/2 calls. A
     /// coordinate along which the model cannot be asked at all stays without effect.
     pub(crate) fn of(acts: &[bool], model: &mut Model<'_>) -> Result<Self, Failure> {
+        Self::crossed(acts, &|_, _| true, model)
+    }
+
+    /// The same with products of those pairs alone that `is_crossed` names.
+    pub(crate) fn crossed(
+        acts: &[bool],
+        is_crossed: &dyn Fn(usize, usize) -> bool,
+        model: &mut Model<'_>,
+    ) -> Result<Self, Failure> {
         let mut x = vec![0.0; acts.len()];
         let at_point = model(&x)?;
         let mut terms = Vec::new();
@@ -61,7 +70,7 @@ impl Surface {
             }
         }
         for (n, (i, step, up)) in steps.iter().enumerate() {
-            for (j, other_step, other_up) in &steps[..n] {
+            for (j, other_step, other_up) in steps[..n].iter().filter(|(j, ..)| is_crossed(*i, *j)) {
                 (x[*i], x[*j]) = (*step, *other_step);
                 let both = answered(model(&x))?;
                 (x[*i], x[*j]) = (0.0, 0.0);

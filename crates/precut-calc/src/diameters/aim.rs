@@ -35,7 +35,11 @@ impl Judged<'_> {
         let stated = vec![0.0; self.axis.len()];
         let [up, down] = [extremes(&stated, 1.0)?, extremes(&stated, -1.0)?];
         let follows: [f64; 2] = std::array::from_fn(|end| 0.5 * (up[end] - down[end]));
+        let has_bounds = !self.uncertainties.within.is_empty();
         let at = |shift: f64| -> Result<f64, Failure> {
+            if has_bounds {
+                return self.worth_nearly(shift, worth);
+            }
             let shifted = |ends: [f64; 2]| std::array::from_fn(|end| ends[end] + follows[end] * shift);
             Ok(worth(sketch.kept(&SETS, &|ends| self.margins(shifted(ends)))?))
         };
@@ -68,7 +72,7 @@ impl Judged<'_> {
         let found = if at_inner >= at_outer { (inner, at_inner) } else { (outer, at_outer) };
         let near = if found.1 > best.1 { found.0 } else { best.0 };
         // The top is flat, and the lines are bent: what is left is found by parabolas.
-        let bent = |shift: f64| -> Result<f64, Failure> { Ok(worth(self.nearly(&self.uncertainties, shift)?)) };
+        let bent = |shift: f64| self.worth_nearly(shift, worth);
         let mut top = near;
         for width in [0.5 * step, 0.25 * step] {
             let [left, here, right] = [bent(top - width)?, bent(top)?, bent(top + width)?];
@@ -83,7 +87,7 @@ impl Judged<'_> {
     pub(super) fn shifted(&self, shift_um: f64, now: Estimate) -> Result<Option<Improvement>, Failure> {
         let (Some(least_um), Some(_)) = (self.asked.open_aim_um, self.limits.middle_um()) else { return Ok(None) };
         let best_um = self.aim_um(&Aim::MostProbable {})?;
-        let then = self.found(best_um)?.of[JOINT];
+        let then = self.least_found(best_um)?;
         let gain = then.probability - now.probability;
         Ok((gain > now.error + then.error && (best_um - shift_um).abs() > least_um).then(|| Improvement::ShiftAim {
             shift_um: best_um,

@@ -4,6 +4,10 @@ use crate::effects::DeflectionEffect;
 use crate::shaft::elastic::ends;
 use crate::shaft::{Carriage, Support};
 
+use super::quantities::DeflectionQuantity;
+
+const UM_PER_MM: f64 = 1e3;
+
 /// How what is cut with differs from what the job states.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Draw {
@@ -26,11 +30,45 @@ pub(crate) struct Draw {
     pub(crate) stock_mm: f64,
     /// Added to the radius that is left, mm.
     pub(crate) scatter_mm: f64,
+    /// The same along the part, by its places; empty where there is none.
+    pub(crate) along: Along,
     /// Effects in place of those of the job.
     pub(crate) effects: Option<Vec<DeflectionEffect>>,
 }
 
+/// What is added to radii, by the places of a part.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::struct_field_names)] // the unit
+pub(crate) struct Along {
+    tool_setting_mm: Vec<f64>,
+    stock_mm: Vec<f64>,
+    scatter_mm: Vec<f64>,
+}
+
+impl Along {
+    const NONE: Self = Self { tool_setting_mm: Vec::new(), stock_mm: Vec::new(), scatter_mm: Vec::new() };
+
+    /// Adds a mode of a quantity of the diameter, um; of no other quantity there are modes.
+    pub(super) fn add(&mut self, quantity: DeflectionQuantity, mode: &[f64], um: f64) {
+        let own = match quantity {
+            DeflectionQuantity::ToolSetting => &mut self.tool_setting_mm,
+            DeflectionQuantity::StockDiameter => &mut self.stock_mm,
+            DeflectionQuantity::SpindleScatter => &mut self.scatter_mm,
+            _ => return,
+        };
+        own.resize(mode.len(), 0.0);
+        own.iter_mut().zip(mode).for_each(|(own, mode)| *own += 0.5 * um * mode / UM_PER_MM);
+    }
+}
+
 impl Draw {
+    /// What is added to the radius that the tool is set to, to that of the blank and to that which is left, at a place of the part.
+    pub(crate) fn added_mm(&self, place: usize) -> [f64; 3] {
+        let at = |along: &[f64]| along.get(place).copied().unwrap_or(0.0);
+        let Along { tool_setting_mm, stock_mm, scatter_mm } = &self.along;
+        [self.tool_setting_mm + at(tool_setting_mm), self.stock_mm + at(stock_mm), self.scatter_mm + at(scatter_mm)]
+    }
+
     /// As the job states.
     pub(crate) const STATED: Self = Self {
         force: 1.0,
@@ -44,6 +82,7 @@ impl Draw {
         tool_setting_mm: 0.0,
         stock_mm: 0.0,
         scatter_mm: 0.0,
+        along: Along::NONE,
         effects: None,
     };
 

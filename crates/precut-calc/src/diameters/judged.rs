@@ -1,14 +1,17 @@
 //! Parts that are judged by the limits of their diameters (`certainty/4`).
 
+use std::rc::Rc;
+
 use crate::calculator::{Failure, Monitor};
-use crate::certainty::lines::{Effort, Found, Margins, Question, Together, Values};
+use crate::certainty::bounds::Extremes;
+use crate::certainty::lines::{Effort, Estimate, Found, Margins, Question, Together, Values};
 use crate::certainty::{
     Conformance, ConformanceMethod, Contribution, Improvement, JointlyKept, Level, LimitKept, SeveralParts, Surface,
     Uncertainties, bounded, normal_below,
 };
 
 use super::limits::SizeLimits;
-use super::quantities::{DeflectionQuantity, draw_of, uncertainties};
+use super::quantities::{Modes, OneQuantity, draw_of, uncertainties};
 use super::{Asked, Parts, Places};
 
 /// Upper and lower limit of size, and form.
@@ -29,12 +32,16 @@ const GAUGE_UM: f64 = 1.0;
 const SHIFT_STEP_UM: f64 = 10.0;
 
 /// Parts that are judged by their limits.
+#[derive(Clone)]
 pub(crate) struct Judged<'a> {
     pub(super) asked: Asked<'a>,
     pub(super) parts: &'a dyn Parts,
-    pub(super) uncertainties: Uncertainties<DeflectionQuantity>,
+    pub(super) uncertainties: Uncertainties<OneQuantity>,
     pub(super) limits: SizeLimits,
-    near: Near,
+    modes: Rc<Modes>,
+    near: Rc<Near>,
+    /// Errors by station at the medians, of the command as it is.
+    stated_um: Vec<f64>,
     /// Independent scores along which what decides changes fastest.
     pub(super) axis: Vec<f64>,
     pub(super) slopes: Slopes,
@@ -50,10 +57,11 @@ pub(super) enum By {
     Surface,
 }
 
-/// Errors by station as a response surface of what the quantities come to and of the shift of the command.
+/// Errors by station as a response surface of what the quantities come to, of the places between bounds, and of the shift of the
+/// command.
 struct Near {
     surface: Surface,
-    /// What every quantity comes to at its median and how far off it is taken, the shift last.
+    /// What every quantity comes to at its median and how far off it is taken; then the places, the shift last.
     scales: Vec<(f64, f64)>,
 }
 
@@ -61,29 +69,36 @@ impl Near {
     fn of(
         asked: &Asked<'_>,
         parts: &dyn Parts,
-        uncertainties: &Uncertainties<DeflectionQuantity>,
+        (uncertainties, modes): (&Uncertainties<OneQuantity>, &Modes),
         shift_step_um: f64,
     ) -> Result<Self, Failure> {
         let mut scales = uncertainties.scales();
+        let with_distribution = scales.len();
+        scales.extend(uncertainties.within.iter().map(|_| (0.0, 1.0)));
         scales.push((0.0, shift_step_um));
         let acts: Vec<bool> = scales.iter().map(|(_, scale)| *scale > 0.0).collect();
         let count = scales.len() - 1;
-        let surface = Surface::of(&acts, &mut |x| {
+        // Errors along the part add to each other.
+        let is_mode = |i: usize| uncertainties.of.get(i).is_some_and(|one| one.quantity.is_mode());
+        let surface = Surface::crossed(&acts, &|i, j| !(is_mode(i) && is_mode(j)), &mut |x| {
             let at = |i: usize| scales[i].0 + scales[i].1 * x[i];
-            let values: Vec<f64> = (0..count).map(at).collect();
-            parts.errors_um(&draw_of(uncertainties, asked.effects, &values)?, at(count))
+            let values: Vec<f64> = (0..with_distribution).map(at).collect();
+            let held = uncertainties.held(&(with_distribution..count).map(at).collect::<Vec<_>>());
+            parts.errors_um(&draw_of((&held, modes), asked.effects, &values)?, at(count))
         })?;
         Ok(Self { surface, scales })
     }
 
-    fn coordinates(&self, values: &[f64], shift_um: f64) -> Vec<f64> {
-        let of =
+    fn coordinates(&self, of: &Uncertainties<OneQuantity>, values: &[f64], shift_um: f64) -> Vec<f64> {
+        let places = of.places();
+        let one =
             |(value, (median, scale)): (f64, &(f64, f64))| if *scale > 0.0 { (value - median) / scale } else { 0.0 };
-        values.iter().copied().chain([shift_um]).zip(&self.scales).map(of).collect()
+        values.iter().copied().chain(places).chain([shift_um]).zip(&self.scales).map(one).collect()
     }
 }
 
 /// Errors as they change with independent scores near the stated values.
+#[derive(Clone)]
 pub(super) struct Slopes {
     /// By station, um.
     pub(super) of_um: Vec<Vec<f64>>,
@@ -98,19 +113,28 @@ impl<'a> Judged<'a> {
         parts: &'a dyn Parts,
         monitor: &'a dyn Monitor,
     ) -> Result<Option<Self>, Failure> {
-        let uncertainties = uncertainties(&asked)
+        let (uncertainties, modes) = uncertainties(&asked, &parts.places().z_mm)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
-        if uncertainties.count() == 0 || parts.places().z_mm.is_empty() {
+        if uncertainties.is_empty() || parts.places().z_mm.is_empty() {
             return Ok(None);
         }
         let limits = asked.tolerance.size();
         let step_um = limits.half_width_um().unwrap_or(SHIFT_STEP_UM);
-        let near = Near::of(&asked, parts, &uncertainties, step_um)?;
+        let near = Near::of(&asked, parts, (&uncertainties, &modes), step_um)?;
         let slopes = Slopes { of_um: Vec::new(), deciding: 0 };
-        let mut judged = Self { asked, parts, uncertainties, limits, near, axis: Vec::new(), slopes, monitor };
+        let (modes, near, stated_um, axis) = (Rc::new(modes), Rc::new(near), Vec::new(), Vec::new());
+        let judged = Self { asked, parts, uncertainties, limits, modes, near, stated_um, axis, slopes, monitor };
+        judged.with(judged.uncertainties.clone()).map(Some)
+    }
+
+    /// The same with the quantities between bounds where they are held there.
+    pub(super) fn with(&self, uncertainties: Uncertainties<OneQuantity>) -> Result<Self, Failure> {
+        let mut judged = Self { uncertainties, ..self.clone() };
+        let medians = vec![0.0; judged.uncertainties.dimensions()];
+        judged.stated_um = judged.errors_um(By::Surface, &judged.uncertainties, &medians, 0.0)?;
         judged.slopes.of_um = judged.slopes_um()?;
         judged.axis = judged.deciding();
-        Ok(Some(judged))
+        Ok(judged)
     }
 
     /// Change of the errors with every independent score, by station.
@@ -156,14 +180,14 @@ impl<'a> Judged<'a> {
     pub(super) fn errors_um(
         &self,
         by: By,
-        of: &Uncertainties<DeflectionQuantity>,
+        of: &Uncertainties<OneQuantity>,
         independent: &[f64],
         shift_um: f64,
     ) -> Result<Vec<f64>, Failure> {
         let values = of.values(independent);
         match by {
-            By::Model => self.parts.errors_um(&draw_of(of, self.asked.effects, &values)?, shift_um),
-            By::Surface => Ok(self.near.surface.at(&self.near.coordinates(&values, shift_um))),
+            By::Model => self.parts.errors_um(&draw_of((of, &self.modes), self.asked.effects, &values)?, shift_um),
+            By::Surface => Ok(self.near.surface.at(&self.near.coordinates(of, &values, shift_um))),
         }
     }
 
@@ -183,7 +207,7 @@ impl<'a> Judged<'a> {
 
     /// Errors by station as they are stated.
     pub(super) fn stated_um(&self) -> &[f64] {
-        self.near.surface.at_point()
+        &self.stated_um
     }
 
     /// By how much the limits are kept, um.
@@ -199,7 +223,7 @@ impl<'a> Judged<'a> {
     pub(super) fn cut(
         &self,
         by: By,
-        of: &Uncertainties<DeflectionQuantity>,
+        of: &Uncertainties<OneQuantity>,
         independent: &[f64],
         shift_um: f64,
     ) -> Result<Margins<LIMITS>, Failure> {
@@ -239,11 +263,7 @@ impl<'a> Judged<'a> {
     }
 
     /// The probabilities by the response surface alone, on few lines: for comparisons on the same ones.
-    pub(super) fn nearly(
-        &self,
-        of: &Uncertainties<DeflectionQuantity>,
-        shift_um: f64,
-    ) -> Result<[f64; SETS.len()], Failure> {
+    pub(super) fn nearly(&self, of: &Uncertainties<OneQuantity>, shift_um: f64) -> Result<[f64; SETS.len()], Failure> {
         let question = self.question(&self.axis, MOST_LINES[1]);
         let found = question.of(&mut |g: &[f64]| self.cut(By::Surface, of, g, shift_um))?;
         Ok(found.of.map(|one| one.probability))
@@ -251,7 +271,8 @@ impl<'a> Judged<'a> {
 
     fn linear_probability(&self) -> Result<f64, Failure> {
         let found = self.question(&self.axis, MOST_LINES[1]).of(&mut |g: &[f64]| {
-            let coordinates = self.near.coordinates(&self.uncertainties.values(g), 0.0);
+            let of = &self.uncertainties;
+            let coordinates = self.near.coordinates(of, &of.values(g), 0.0);
             Ok(self.margins(self.parts.places().extremes_um(&self.near.surface.linear_at(&coordinates))))
         })?;
         Ok(found.of[JOINT].probability)
@@ -289,14 +310,45 @@ impl<'a> Judged<'a> {
         axis
     }
 
+    /// Where within bounds the probability is least and most, of a command that is larger by `shift_um`; `None` where there are none.
+    fn extremes(&self, shift_um: f64) -> Result<Option<Extremes>, Failure> {
+        self.uncertainties.extremes(&mut |of| Ok(self.with(of.clone())?.nearly(of, shift_um)?[JOINT]))
+    }
+
+    /// What the probabilities of the response surface are worth, within bounds the least.
+    pub(super) fn worth_nearly(&self, shift_um: f64, worth: &dyn Fn([f64; SETS.len()]) -> f64) -> Result<f64, Failure> {
+        let at = |of: &Uncertainties<OneQuantity>| Ok(worth(self.with(of.clone())?.nearly(of, shift_um)?));
+        match self.uncertainties.extremes(&mut { at })? {
+            Some(extremes) => at(&self.uncertainties.held(&extremes.least)),
+            None => Ok(worth(self.nearly(&self.uncertainties, shift_um)?)),
+        }
+    }
+
+    /// The probability of all limits, within bounds the least.
+    pub(super) fn least_found(&self, shift_um: f64) -> Result<Estimate, Failure> {
+        match self.extremes(shift_um)? {
+            Some(extremes) => Ok(self.with(self.uncertainties.held(&extremes.least))?.found(shift_um)?.of[JOINT]),
+            None => Ok(self.found(shift_um)?.of[JOINT]),
+        }
+    }
+
     /// The whole block, of a command that is larger by `shift_um` than the exact one.
     pub(crate) fn conformance(&self, shift_um: f64) -> Result<Conformance, Failure> {
+        let Some(Extremes { least, most, search }) = self.extremes(shift_um)? else { return self.told(shift_um) };
+        let [least, most] = [least, most].map(|places| self.with(self.uncertainties.held(&places)));
+        let mut told = least?.told(shift_um)?;
+        told.joint = told.joint.least(most?.found(shift_um)?.of[JOINT].probability, search);
+        Ok(told)
+    }
+
+    /// The block with the quantities between bounds where they are.
+    fn told(&self, shift_um: f64) -> Result<Conformance, Failure> {
         let uncertainty = self.asked.uncertainty;
         let found = self.found(shift_um)?;
         let joint = found.of[JOINT];
         // What something else makes of it is compared on the same lines.
         let now = self.nearly(&self.uncertainties, shift_um)?[JOINT];
-        let told = |of: &Uncertainties<DeflectionQuantity>| -> Result<f64, Failure> {
+        let told = |of: &Uncertainties<OneQuantity>| -> Result<f64, Failure> {
             Ok(bounded(joint.probability + self.nearly(of, shift_um)?[JOINT] - now))
         };
         let mut advice: Vec<Improvement> = Vec::new();
@@ -318,17 +370,16 @@ impl<'a> Judged<'a> {
                 joint_probability_if_halved: Some(told(&halved)?),
             });
         }
+        contributions.extend(
+            self.uncertainties
+                .contributions_within(joint.probability, &mut |of| Ok(self.nearly(of, shift_um)?[JOINT]))?,
+        );
         Contribution::sort(&mut contributions);
         let common = self.common_share();
         let probability = bounded(joint.probability);
         Ok(Conformance {
             limits: self.limits_kept(&found),
-            joint: JointlyKept {
-                probability,
-                numerical_error: joint.error,
-                wanted: uncertainty.wanted_probability,
-                met: probability >= uncertainty.wanted_probability,
-            },
+            joint: JointlyKept::of(joint, uncertainty.wanted_probability),
             setup: SeveralParts {
                 count: uncertainty.parts_per_setup,
                 probability_all_good: self.all_good(probability),

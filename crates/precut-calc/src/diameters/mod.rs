@@ -6,6 +6,7 @@
 
 mod acceptance;
 mod aim;
+mod along;
 mod draw;
 mod first_part;
 mod judged;
@@ -36,6 +37,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) effects: &'a [DeflectionEffect],
     /// The least shift of the aim that is worth saying, um; none where the job has no aim that could be another one.
     pub(crate) open_aim_um: Option<f64>,
+    /// Whether errors may be new at every place along the part.
+    pub(crate) has_places: bool,
 }
 
 /// Parts as a calculator cuts them.

@@ -11,7 +11,7 @@ use crate::certainty::{
 use crate::effects::DeflectionEffect;
 
 use super::limits::{Tolerance, Uncertainty};
-use super::{Asked, Draw};
+use super::{Asked, Draw, along};
 
 const UM_PER_MM: f64 = 1e3;
 /// Standard uncertainty of the diameter that a tool is set to, where nobody states it, um.
@@ -20,7 +20,14 @@ const TOOL_SETTING_UM: f64 = 2.0;
 const LARGEST_NORMAL_PERCENT: f64 = 25.0;
 
 /// Codes of the faults found here.
-pub(crate) const CODES: &[&str] = &["tolerance_given_twice", "limits_crossed"];
+pub(crate) const CODES: &[&str] = &[
+    "tolerance_given_twice",
+    "limits_crossed",
+    "level_of_quantity",
+    "correlation_length_missing",
+    "correlation_length_unused",
+    "place_correlated",
+];
 
 /// Codes of what may be doubted, in the picture of the doubt.
 pub(crate) const DOUBT_LABELS: &[&str] = &[
@@ -101,6 +108,11 @@ const PARTS_OF_STIFFNESS: [DeflectionQuantity; 5] = [
 ];
 
 impl DeflectionQuantity {
+    /// Whether it may be new at every place along a part: what is added to a diameter.
+    fn varies_along(self) -> bool {
+        matches!(self, Self::ToolSetting | Self::StockDiameter | Self::SpindleScatter)
+    }
+
     fn usual_level(self) -> Level {
         match self {
             Self::StockDiameter | Self::SpindleScatter => Level::Part,
@@ -163,10 +175,15 @@ pub struct DeflectionUncertainQuantity {
     pub quantity: DeflectionQuantity,
     /// How it is distributed about what the job states.
     pub distribution: Distribution,
-    /// Among what it varies; not said: blank and spindle from part to part, all others from set-up to set-up.
+    /// Among what it varies; not said: blank and spindle from part to part, all others from set-up to set-up. `place` is for normal
+    /// additions to a diameter, with `correlation_length_mm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(example = "setup")]
     pub level: Option<Level>,
+    /// How far apart places are at which the correlation of a quantity of the level `place` is 0.48.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1.0, maximum = 100_000.0, example = 80.0, extensions(("x-unit" = json!("mm")), ("x-symbol" = json!("l"))))]
+    pub correlation_length_mm: Option<f64>,
 }
 
 /// How two quantities go together.
@@ -181,29 +198,75 @@ pub struct DeflectionCorrelation {
     pub coefficient: f64,
 }
 
-/// All quantities of a checked job that are uncertain, and how they go together.
-pub(super) fn uncertainties(asked: &Asked<'_>) -> Result<Uncertainties<DeflectionQuantity>, Contradiction> {
+/// A quantity, of one mode where it is new at every place along a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct OneQuantity {
+    quantity: DeflectionQuantity,
+    mode: Option<usize>,
+}
+
+impl OneQuantity {
+    pub(super) fn is_mode(self) -> bool {
+        self.mode.is_some()
+    }
+}
+
+impl Quantity for OneQuantity {
+    fn name(self) -> &'static str {
+        self.quantity.name()
+    }
+
+    fn unit(self) -> WidthUnit {
+        self.quantity.unit()
+    }
+}
+
+/// What modes of quantities are at the places of a part, for errors of standard deviation 1.
+pub(super) type Modes = Vec<Vec<f64>>;
+
+/// All quantities of a checked job that are uncertain, how they go together, and their modes at the places of a part.
+pub(super) fn uncertainties(
+    asked: &Asked<'_>,
+    z_mm: &[f64],
+) -> Result<(Uncertainties<OneQuantity>, Modes), Contradiction> {
     let stated = asked.uncertainty;
-    let mut of: Vec<Uncertain<DeflectionQuantity>> = stated
-        .quantities
-        .iter()
-        .map(|one| Uncertain {
-            quantity: one.quantity,
+    let (mut of, mut modes): (Vec<Uncertain<OneQuantity>>, Modes) = (Vec::new(), Vec::new());
+    for one in &stated.quantities {
+        let uncertain = |mode: Option<usize>| Uncertain {
+            quantity: OneQuantity { quantity: one.quantity, mode },
             distribution: one.distribution.clone(),
             level: one.level.unwrap_or(one.quantity.usual_level()),
             source: Source::Stated,
-        })
-        .collect();
+        };
+        match one.correlation_length_mm.filter(|_| one.level == Some(Level::Place)) {
+            Some(length_mm) => {
+                for mode in along::modes(z_mm, length_mm) {
+                    of.push(uncertain(Some(modes.len())));
+                    modes.push(mode);
+                }
+            }
+            None => of.push(uncertain(None)),
+        }
+    }
     for usual in usual(asked) {
-        let is_stated = of.iter().any(|one| {
+        let is_stated = stated.quantities.iter().any(|one| {
             one.quantity == usual.quantity
                 || usual.quantity == DeflectionQuantity::Stiffness && one.quantity.is_of_stiffness()
         });
         if !is_stated && !is_replaced(asked, usual.quantity) && (stated.defaults || usual.source == Source::Stated) {
-            of.push(usual);
+            let Uncertain { quantity, distribution, level, source } = usual;
+            of.push(Uncertain { quantity: OneQuantity { quantity, mode: None }, distribution, level, source });
         }
     }
-    Ok(Uncertainties::new(of, pairs(stated))?.beside(OpenEffects::of(asked.effects, &stated.effects)))
+    let pairs = single(&pairs(stated));
+    let of = Uncertainties::new(of, pairs.iter().map(|(between, coefficient)| (&between[..], *coefficient)))?;
+    Ok((of.beside(OpenEffects::of(asked.effects, &stated.effects)), modes))
+}
+
+/// Pairs of the contract; what is new at every place goes together with nothing.
+fn single(pairs: &[Pair<'_, DeflectionQuantity>]) -> Vec<(Vec<OneQuantity>, f64)> {
+    let one = |quantity: &DeflectionQuantity| OneQuantity { quantity: *quantity, mode: None };
+    pairs.iter().map(|(between, coefficient)| (between.iter().map(one).collect(), *coefficient)).collect()
 }
 
 /// Whether what is usual of a quantity gives way to what is told of an effect: of itself, or of a part of it.
@@ -218,13 +281,16 @@ fn pairs(stated: &Uncertainty) -> Vec<Pair<'_, DeflectionQuantity>> {
 
 /// What is cut with where the quantities come to this; `effects` are those that the job states.
 pub(super) fn draw_of(
-    of: &Uncertainties<DeflectionQuantity>,
+    (of, modes): (&Uncertainties<OneQuantity>, &Modes),
     effects: &[DeflectionEffect],
     values: &[f64],
 ) -> Result<Draw, Failure> {
     let mut draw = Draw { effects: of.effects.effects(effects, of.of_effects(values))?, ..Draw::STATED };
-    for (one, value) in of.of.iter().zip(values) {
-        one.quantity.put(*value, &mut draw);
+    for (OneQuantity { quantity, mode }, value) in of.drawn(values) {
+        match mode.and_then(|mode| modes.get(mode)) {
+            Some(mode) => draw.along.add(quantity, mode, value),
+            None => quantity.put(value, &mut draw),
+        }
     }
     Ok(draw)
 }
@@ -304,7 +370,44 @@ pub(crate) fn check(asked: &Asked<'_>, violations: &mut Violations) {
     check_quantities(&quantities, violations);
     certainty::open::check(asked.effects, &stated.effects, violations);
     check_brought(quantities.iter().map(|(quantity, _)| *quantity), |one| one.is_brought(asked), violations);
-    check_correlations(&pairs(stated), || uncertainties(asked).err(), violations);
+    check_correlations(&pairs(stated), &quantities, || uncertainties(asked, &[]).err(), violations);
+    check_levels(asked, violations);
+}
+
+/// Finds levels that a quantity cannot have: along a part there are normal additions to a diameter alone.
+fn check_levels(asked: &Asked<'_>, violations: &mut Violations) {
+    let stated = asked.uncertainty;
+    let is_place = |one: &DeflectionUncertainQuantity| one.level == Some(Level::Place);
+    for (i, one) in stated.quantities.iter().enumerate() {
+        let at = |field: &str| format!("/uncertainty/quantities/{i}/{field}");
+        let length = one.correlation_length_mm;
+        if !is_place(one) {
+            violations.require(length.is_none(), || {
+                Finding::new("correlation_length_unused", at("correlation_length_mm"))
+                    .with("quantity", one.quantity.name())
+            });
+            continue;
+        }
+        let is_normal = matches!(one.distribution, Distribution::Normal { .. });
+        violations.require(asked.has_places && one.quantity.varies_along() && is_normal, || {
+            Finding::new("level_of_quantity", at("level"))
+                .with("quantity", one.quantity.name())
+                .with("has_places", if asked.has_places { "yes" } else { "no" })
+        });
+        violations.require(length.is_some(), || {
+            Finding::new("correlation_length_missing", at("correlation_length_mm"))
+                .with("quantity", one.quantity.name())
+        });
+    }
+    for (i, pair) in stated.correlations.iter().enumerate() {
+        let along = stated.quantities.iter().find(|one| is_place(one) && pair.between.contains(&one.quantity));
+        if let Some(along) = along {
+            violations.add(
+                Finding::new("place_correlated", format!("/uncertainty/correlations/{i}/between"))
+                    .with("quantity", along.quantity.name()),
+            );
+        }
+    }
 }
 
 fn check_limits(tolerance: &Tolerance, violations: &mut Violations) {

@@ -1,7 +1,7 @@
 //! What is said of the probability that diameters keep their limits.
 
 use crate::calculator::{Finding, Message};
-use crate::certainty::{Conformance, Improvement, with_largest};
+use crate::certainty::{Conformance, Improvement, with_largest, with_most};
 
 use super::{Asked, acceptance};
 
@@ -18,7 +18,7 @@ pub(crate) fn said(conformance: &Conformance) -> Vec<Message> {
         .with("wanted_percent", 100.0 * joint.wanted)
         .with("met", if joint.met { "yes" } else { "no" })
         .with("common_percent", 100.0 * conformance.setup.share_common_to_all);
-    let first = with_largest(first, &conformance.contributions);
+    let first = with_largest(with_most(first, joint), &conformance.contributions);
     let advised = conformance.advice.iter().map(|advice| match *advice {
         Improvement::ShiftAim { shift_um, joint_probability, .. } => {
             Message::new("aim_tells").with("shift_um", shift_um).with("percent", 100.0 * joint_probability)

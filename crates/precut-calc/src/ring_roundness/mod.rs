@@ -59,7 +59,7 @@ impl Calculator for RingRoundness {
     const META: Meta = Meta {
         id: "ring-roundness",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "Ring roundness",
         question: "How round will a ring get that is turned while it rests on the surface being turned?",
         summary: "A ring or a journal rests with the surface being turned on two supports while a wide-edge tool is fed \

@@ -317,6 +317,7 @@ impl Job {
             uncertainty: &self.uncertainty,
             effects: &self.effects,
             open_aim_um: is_open.then_some(self.path.increment_um),
+            has_places: true,
         }
     }
 }

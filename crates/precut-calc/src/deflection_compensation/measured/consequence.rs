@@ -91,7 +91,7 @@ pub(super) fn parts_kept(
     let effects: Vec<DeflectionEffect> = told.effects.iter().chain(others).cloned().collect();
     let uncertainty = Uncertainty { effects: told.open.to_vec(), ..job.uncertainty.clone() };
     let asked = Asked { uncertainty: &uncertainty, effects: &effects, ..planned.asked() };
-    Ok(Some(diameters::kept(rehearsal, &asked, acting, monitor)?))
+    diameters::kept(rehearsal, &asked, acting, monitor)
 }
 
 /// The job of one cut from the stock with these effects beside its own: it takes the switches as they stand, as the model that

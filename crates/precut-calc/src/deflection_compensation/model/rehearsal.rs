@@ -73,10 +73,11 @@ impl<'a> Rehearsal<'a> {
     }
 
     fn line<'l>(&self, cut: &'l PlannedCut, draw: &Draw) -> Result<Cow<'l, Line>, Failure> {
-        if *draw == (Draw { tool_setting_mm: draw.tool_setting_mm, stock_mm: draw.stock_mm, ..Draw::STATED }) {
+        let [load, weight] = draw.loads();
+        #[allow(clippy::float_cmp)] // what is stated is stated exactly
+        if !draw.changes_structure() && [load, weight] == [1.0; 2] {
             return Ok(Cow::Borrowed(&cut.line));
         }
-        let [load, weight] = draw.loads();
         if !draw.changes_structure() {
             return Ok(Cow::Owned(cut.line.under(load, weight)));
         }
@@ -101,7 +102,9 @@ impl Parts for Rehearsal<'_> {
     /// Diameter errors of the part that is left, um; with the last cut's commanded diameter larger by `shift_um`.
     fn errors_um(&self, draw: &Draw, shift_um: f64) -> Result<Vec<f64>, Failure> {
         let Some(first) = self.cuts.first() else { return Ok(Vec::new()) };
-        let mut left: Vec<f64> = first.radii.stock.iter().map(|stock| stock + draw.stock_mm).collect();
+        let added: Vec<[f64; 3]> = (0..first.radii.stock.len()).map(|place| draw.added_mm(place)).collect();
+        let mut left: Vec<f64> =
+            first.radii.stock.iter().zip(&added).map(|(stock, [_, of_stock, _])| stock + of_stock).collect();
         for (number, cut) in self.cuts.iter().enumerate() {
             let is_last = number + 1 == self.cuts.len();
             let aim_mm = if is_last { 0.5 * shift_um / UM_PER_MM } else { 0.0 };
@@ -109,13 +112,15 @@ impl Parts for Rehearsal<'_> {
             let mut solver = line.solver();
             for (i, (left, command)) in left.iter_mut().zip(&cut.command_mm).enumerate() {
                 if !cut.radii.is_idle(i) {
-                    let command = command + draw.tool_setting_mm + aim_mm;
+                    let command = command + added[i][0] + aim_mm;
                     *left -= solver.engage(i, *left, command, *left - cut.radii.target[i]).depth_mm();
                 }
             }
         }
         let targets = self.cuts.last().map_or(&[][..], |last| &last.radii.target[..]);
-        Ok(left.iter().zip(targets).map(|(r, target)| 2.0 * (r + draw.scatter_mm - target) * UM_PER_MM).collect())
+        let error =
+            |((r, target), [_, _, scatter]): ((&f64, &f64), &[f64; 3])| 2.0 * (r + scatter - target) * UM_PER_MM;
+        Ok(left.iter().zip(targets).zip(&added).map(error).collect())
     }
 }
 

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::certainty::around::{Around, Asked, Real, far};
+use crate::certainty::bounds::Extremes;
 use crate::certainty::deepest::deepest_mm;
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{
@@ -59,6 +60,7 @@ pub struct FixtureConformance {
 }
 
 /// A vise that is judged by what may give out in it.
+#[derive(Clone)]
 pub(in crate::fixture_stability) struct Judged<'a> {
     job: &'a FixtureJob,
     case: &'a Case,
@@ -79,7 +81,7 @@ impl<'a> Judged<'a> {
     ) -> Result<Option<Self>, Failure> {
         let uncertainties = uncertainties(job)
             .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
-        if uncertainties.count() == 0 {
+        if uncertainties.is_empty() {
             return Ok(None);
         }
         let clamped = case.holding.clamp_force_n.is_some_and(|force| force > 0.0);
@@ -131,24 +133,60 @@ impl<'a> Judged<'a> {
         self.margins(&drawn(self.job, self.case, &self.uncertainties, factors)?, working)
     }
 
+    /// The same with the quantities between bounds where they are held there.
+    fn with(&self, uncertainties: Uncertainties<FixtureQuantity>) -> Self {
+        Self { uncertainties, ..self.clone() }
+    }
+
+    /// Where within bounds the probability is least and most; `None` where there are none.
+    fn extremes(&self, working: Working) -> Result<Option<Extremes>, Failure> {
+        self.uncertainties.extremes(&mut |of| self.with(of.clone()).nearly(working))
+    }
+
+    /// The probability that all limits are kept, by a response surface alone.
+    fn nearly(&self, working: Working) -> Result<f64, Failure> {
+        let real = |factors: &[f64]| self.tried(factors, working);
+        self.around(&real)?.nearly()
+    }
+
     /// The block of the answer. `deepest_mm` where a depth is looked for, too, and how deep.
     pub(in crate::fixture_stability) fn conformance(
         &self,
         deepest_mm: Option<f64>,
     ) -> Result<FixtureConformance, Failure> {
-        let real = |factors: &[f64]| self.tried(factors, self.case.working);
+        let working = self.case.working;
+        let extremes = self.extremes(working)?;
+        let mut told = match &extremes {
+            Some(extremes) => self.with(self.uncertainties.held(&extremes.least)).told(deepest_mm.is_some())?,
+            None => self.told(deepest_mm.is_some())?,
+        };
+        if let Some(Extremes { most, search, .. }) = &extremes {
+            let most = self.with(self.uncertainties.held(most)).alone(working)?;
+            told.joint = told.joint.least(most, *search);
+        }
+        if let Some(deepest_mm) = deepest_mm {
+            told.depth_at_wanted_mm = self.depth_mm(working, told.joint.wanted, deepest_mm)?;
+        }
+        Ok(told)
+    }
+
+    /// The block with the quantities between bounds where they are, but for the depth.
+    fn told(&self, is_compared: bool) -> Result<FixtureConformance, Failure> {
+        let working = self.case.working;
+        let real = |factors: &[f64]| self.tried(factors, working);
         let around = self.around(&real)?;
         let found = around.found()?;
-        let wanted = self.job.uncertainty.wanted_probability;
-        let compared = deepest_mm.map(|_| COMPARED_LINES);
+        let joint = JointlyKept::of(found.of[ALL], self.job.uncertainty.wanted_probability);
+        let mut contributions = around.contributions(&found, is_compared.then_some(COMPARED_LINES))?;
+        contributions.extend(
+            self.uncertainties
+                .contributions_within(joint.probability, &mut |of| self.with(of.clone()).nearly(working))?,
+        );
         Ok(FixtureConformance {
             limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
-            joint: JointlyKept::of(found.of[ALL], wanted),
-            contributions: around.contributions(&found, compared)?,
-            depth_at_wanted_mm: match deepest_mm {
-                Some(deepest_mm) => self.depth_mm(self.case.working, wanted, deepest_mm)?,
-                None => None,
-            },
+            joint,
+            contributions,
+            depth_at_wanted_mm: None,
             method: ConformanceMethod {
                 integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
                 linear_probability: bounded(around.linear_probability()?),
@@ -157,8 +195,16 @@ impl<'a> Judged<'a> {
         })
     }
 
-    /// The probability that all limits are kept at another working point.
+    /// The probability that all limits are kept at another working point, within bounds the least.
     pub(in crate::fixture_stability) fn probability(&self, working: Working) -> Result<f64, Failure> {
+        match self.extremes(working)? {
+            Some(extremes) => self.with(self.uncertainties.held(&extremes.least)).alone(working),
+            None => self.alone(working),
+        }
+    }
+
+    /// The same with the quantities between bounds where they are.
+    fn alone(&self, working: Working) -> Result<f64, Failure> {
         let real = |factors: &[f64]| self.tried(factors, working);
         Ok(bounded(self.around(&real)?.found()?.of[ALL].probability))
     }

@@ -169,10 +169,11 @@ fn usual(job: &FixtureJob) -> Vec<(FixtureQuantity, f64)> {
 /// acts on the clamp force alone.
 const SCALING: [&str; 5] = ["stiffness", "damping", "mass", "force_coefficient", "preload_loss"];
 
-/// Whether what is not known of the effects of a job is of those alone.
+/// Whether what is not known of the effects of a job is of those alone, and every quantity has a distribution.
 pub(in crate::fixture_stability) fn scales_alone(job: &FixtureJob) -> bool {
     let is_open = |kind: &str| open::tells_of(&job.effects, &job.uncertainty.effects, kind);
     job.effects.iter().map(FixtureEffect::kind).all(|kind| SCALING.contains(&kind) || !is_open(kind))
+        && !job.uncertainty.quantities.iter().any(|one| one.distribution.is_interval())
 }
 
 /// The vise where the quantities come to these values.
@@ -192,8 +193,8 @@ pub(in crate::fixture_stability) fn drawn(
     };
     let friction = case.grip.as_ref().map_or(1.0, |grip| grip.friction.value);
     let mut draw = Drawn { case, friction };
-    for (one, factor) in of.of.iter().zip(values) {
-        one.quantity.put(*factor, &mut draw);
+    for (quantity, factor) in of.drawn(values) {
+        quantity.put(factor, &mut draw);
     }
     Ok(draw)
 }

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message};
 use crate::certainty::around::{Around, Asked, Real, far};
+use crate::certainty::bounds::Extremes;
 use crate::certainty::deepest::deepest_mm;
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{
@@ -80,6 +81,7 @@ pub struct MillingConformance {
 }
 
 /// A cut that is judged by what may give out in it.
+#[derive(Clone)]
 struct Judged<'a> {
     study: &'a Study<'a>,
     of: Uncertainties<OneQuantity>,
@@ -92,34 +94,33 @@ struct Judged<'a> {
 /// The block of the answer; `None` where nothing is uncertain.
 pub(super) fn conformance(study: &Study<'_>) -> Result<Option<MillingConformance>, Failure> {
     let Some(judged) = Judged::new(study)? else { return Ok(None) };
-    let there = judged.at(study.case.depth_mm)?;
-    let real = |factors: &[f64]| there.margins(factors);
-    let around = judged.around(&real, MOST_LINES)?;
-    let found = around.found()?;
-    let wanted = study.job.uncertainty.wanted_probability;
-    let probability = |depth_mm: f64| {
-        let there = judged.at(depth_mm)?;
-        let real = |factors: &[f64]| there.margins(factors);
-        Ok(bounded(judged.around(&real, MOST_LINES_TRIED)?.found()?.of[ALL].probability))
+    let depth_mm = study.case.depth_mm;
+    let extremes = judged.extremes(depth_mm)?;
+    let mut told = match &extremes {
+        Some(extremes) => judged.with(judged.of.held(&extremes.least)).told()?,
+        None => judged.told()?,
     };
-    Ok(Some(MillingConformance {
-        limits: judged.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
-        joint: JointlyKept::of(found.of[ALL], wanted),
-        contributions: around.contributions(&found, Some(COMPARED_LINES))?,
-        depth_at_wanted_mm: deepest_mm(study.case.depth_mm, study.examined_mm, wanted, &mut { probability })?,
-        method: ConformanceMethod {
-            integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
-            linear_probability: bounded(around.linear_probability()?),
-            seed: study.job.uncertainty.seed,
-        },
-    }))
+    if let Some(Extremes { most, search, .. }) = &extremes {
+        let most = judged.with(judged.of.held(most)).alone(depth_mm, MOST_LINES)?;
+        told.joint = told.joint.least(most, *search);
+    }
+    let mut probability = |depth_mm: f64| judged.probability(depth_mm);
+    told.depth_at_wanted_mm = deepest_mm(depth_mm, study.examined_mm, told.joint.wanted, &mut probability)?;
+    Ok(Some(told))
 }
 
-/// Draws of the real model that a job with so many uncertain quantities under so many names takes.
-pub(in crate::milling_stability) fn draws(quantities: usize, names: usize) -> f64 {
+/// Draws of the real model that a job takes with so many quantities that have a distribution, so many of which bounds alone are known,
+/// and so many names of them.
+pub(in crate::milling_stability) fn draws([quantities, within]: [usize; 2], names: usize) -> f64 {
     let count = quantities as f64;
     let surface = 1.0 + 2.0 * count + 0.5 * count * (count - 1.0);
-    surface + DRAWS + DEPTHS_TRIED * (surface + DRAWS_TRIED) + (1.0 + names as f64) * DRAWS_COMPARED
+    let compared = (1.0 + names as f64) * DRAWS_COMPARED;
+    let all = surface + DRAWS + DEPTHS_TRIED * (surface + DRAWS_TRIED) + compared;
+    if within == 0 {
+        return all;
+    }
+    // Surfaces in the middle and, of each quantity, at the ends on three lines; and the largest probability beside the least.
+    all + (1.0 + DEPTHS_TRIED) * (1.0 + 6.0 * within as f64) * surface + surface + DRAWS
 }
 
 impl<'a> Judged<'a> {
@@ -144,7 +145,7 @@ impl<'a> Judged<'a> {
             (HELD, held.is_some()),
         ];
         let limits: Vec<usize> = limits.into_iter().filter(|(_, is)| *is).map(|(limit, _)| limit).collect();
-        let is_known = of.of.is_empty() || limits.is_empty();
+        let is_known = of.is_empty() || limits.is_empty();
         Ok((!is_known).then_some(Self { study, of, limits, held }))
     }
 
@@ -161,6 +162,62 @@ impl<'a> Judged<'a> {
             most_lines,
             monitor: self.study.monitor,
             real,
+        })
+    }
+
+    /// The same with the quantities between bounds where they are held there.
+    fn with(&self, of: Uncertainties<OneQuantity>) -> Self {
+        Self { of, ..self.clone() }
+    }
+
+    /// Where within bounds the probability is least and most; `None` where there are none.
+    fn extremes(&self, depth_mm: f64) -> Result<Option<Extremes>, Failure> {
+        self.of.extremes(&mut |of| self.with(of.clone()).nearly(depth_mm))
+    }
+
+    /// The probability that all limits are kept at a depth, by a response surface alone.
+    fn nearly(&self, depth_mm: f64) -> Result<f64, Failure> {
+        let there = self.at(depth_mm)?;
+        let real = |factors: &[f64]| there.margins(factors);
+        self.around(&real, MOST_LINES_TRIED)?.nearly()
+    }
+
+    /// The same by the real model, with the quantities between bounds where they are.
+    fn alone(&self, depth_mm: f64, most_lines: [usize; 2]) -> Result<f64, Failure> {
+        let there = self.at(depth_mm)?;
+        let real = |factors: &[f64]| there.margins(factors);
+        Ok(bounded(self.around(&real, most_lines)?.found()?.of[ALL].probability))
+    }
+
+    /// That of a depth that is tried, within bounds the least.
+    fn probability(&self, depth_mm: f64) -> Result<f64, Failure> {
+        match self.extremes(depth_mm)? {
+            Some(extremes) => self.with(self.of.held(&extremes.least)).alone(depth_mm, MOST_LINES_TRIED),
+            None => self.alone(depth_mm, MOST_LINES_TRIED),
+        }
+    }
+
+    /// The block with the quantities between bounds where they are, but for the depth.
+    fn told(&self) -> Result<MillingConformance, Failure> {
+        let depth_mm = self.study.case.depth_mm;
+        let there = self.at(depth_mm)?;
+        let real = |factors: &[f64]| there.margins(factors);
+        let around = self.around(&real, MOST_LINES)?;
+        let found = around.found()?;
+        let joint = JointlyKept::of(found.of[ALL], self.study.job.uncertainty.wanted_probability);
+        let mut contributions = around.contributions(&found, Some(COMPARED_LINES))?;
+        contributions
+            .extend(self.of.contributions_within(joint.probability, &mut |of| self.with(of.clone()).nearly(depth_mm))?);
+        Ok(MillingConformance {
+            limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
+            joint,
+            contributions,
+            depth_at_wanted_mm: None,
+            method: ConformanceMethod {
+                integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
+                linear_probability: bounded(around.linear_probability()?),
+                seed: self.study.job.uncertainty.seed,
+            },
         })
     }
 

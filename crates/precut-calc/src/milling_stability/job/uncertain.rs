@@ -305,8 +305,7 @@ pub(in crate::milling_stability) struct Drawn {
 pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQuantity>, factors: &[f64]) -> Drawn {
     let (milling, structure) = (case.milling.clone(), case.structure.clone());
     let mut draw = Drawn { milling, structure, force: 1.0, clamp: 1.0, friction: 1.0, has_other_teeth: false };
-    for (one, &factor) in of.of.iter().zip(factors) {
-        let OneQuantity { quantity, mode } = one.quantity;
+    for (OneQuantity { quantity, mode }, factor) in of.drawn(factors) {
         if let (Some((_, part)), Some(mode)) = (quantity.of_modes(), mode) {
             put(part, factor, &mut draw.structure.modes[mode]);
             continue;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, checkpoint};
-use crate::certainty::lines::{Effort, Question, SCRAMBLINGS, Sampled};
+use crate::certainty::lines::{Effort, Estimate, Question, SCRAMBLINGS, Sampled};
 use crate::certainty::{
     Contribution, JointlyKept, Level, LimitKept, Quantity, Source, Surface, Uncertainties, WidthUnit, bounded,
     improbable, normal_below, probably,
@@ -107,45 +107,43 @@ pub(in crate::ring_roundness) fn conformance(
     let of = uncertainties(job)
         .map_err(|_| Failure::Internal("correlations of a checked job contradict each other".to_owned()))?;
     let blank_mm = scene.blank_mm(job, nodes(job) as usize).map_err(unevaluable)?;
-    let judged = Judged { job, scene, end, blank_mm, limit_um, of, share, cut: AtomicUsize::new(0) };
+    let mut judged = Judged { job, scene, end, blank_mm, limit_um, of, share, cut: AtomicUsize::new(0) };
     let surface = judged.surface()?;
-    let near = |of: &Uncertainties<RingQuantity>, g: &[f64]| surface.at(&judged.coordinates(of, g))[0];
-    let count = judged.of.dimensions();
-    let slopes: Vec<f64> = (0..count)
-        .map(|index| {
-            let at = |score: f64| {
-                let mut g = vec![0.0; count + PHASES];
-                g[index] = score;
-                near(&judged.of, &g)
-            };
-            at(0.5) - at(-0.5)
-        })
-        .collect();
-    let axis: Vec<f64> = slopes.iter().copied().chain([0.0; PHASES]).collect();
-    let effort = Effort { seed: job.uncertainty.seed, most_lines: MOST_LINES };
-    let by_surface = |of: &Uncertainties<RingQuantity>, least: f64| -> Result<f64, Failure> {
-        let question = Question { axis: &axis, sets: [0..=0], effort, monitor: share.monitor };
-        Ok(question.of(&mut |g: &[f64]| Ok([near(of, g) - least]))?.of[0].probability)
+    let extremes = judged.of.extremes(&mut |of| judged.by_surface(&surface, of, 0.0))?;
+    let most = match &extremes {
+        Some(extremes) => {
+            judged.of = judged.of.held(&extremes.most);
+            let most = judged.found(&surface)?.1.probability;
+            judged.of = judged.of.held(&extremes.least);
+            Some((most, extremes.search))
+        }
+        None => None,
     };
-    let own = |g: &[f64]| near(&judged.of, g);
-    let nearly = |least: f64| by_surface(&judged.of, least);
-    let mut real = |points: &[Vec<f64>]| judged.margins(points);
-    let sampled = Sampled::until((ENOUGH, MOST_RINGS), (axis.len(), effort), (&own, &nearly), &mut real)?;
-    let found = sampled.kept(0.0, &own, &nearly)?;
+    let (sampled, found) = judged.found(&surface)?;
+    let own = |g: &[f64]| judged.near(&surface, &judged.of, g);
+    let nearly = |least: f64| judged.by_surface(&surface, &judged.of, least);
     let below = |um: f64| Ok(sampled.kept((limit_um / um).ln(), &own, &nearly)?.probability);
     let off = sampled.variance_off(&own);
     let now = nearly(0.0)?;
     let halved = |places: &[usize]| {
         let halved = places.iter().fold(judged.of.clone(), |of, &place| of.halved(place));
-        Ok(bounded(found.probability + by_surface(&halved, 0.0)? - now))
+        Ok(bounded(found.probability + judged.by_surface(&surface, &halved, 0.0)? - now))
     };
-    let contributions = judged.contributions(&slopes, off, halved)?;
+    let slopes = judged.slopes(&surface, &judged.of);
+    let mut contributions = judged.contributions(&slopes, off, halved)?;
+    let by_surface = &mut |of: &Uncertainties<RingQuantity>| judged.by_surface(&surface, of, 0.0);
+    contributions.extend(judged.of.contributions_within(found.probability, by_surface)?);
     let is_common = |one: &&Contribution| one.level == Level::Setup;
     let length = slopes.iter().map(|s| s * s).sum::<f64>().sqrt();
     let wanted = job.uncertainty.wanted_probability;
+    let joint = JointlyKept::of(found, wanted);
+    let stated = judged.near(&surface, &judged.of, &vec![0.0; slopes.len() + PHASES]);
     Ok(RingConformance {
         limits: vec![LimitKept::of(("roundness", POINTER), found)],
-        joint: JointlyKept::of(found, wanted),
+        joint: match most {
+            Some((most, search)) => joint.least(most, search),
+            None => joint,
+        },
         roundness_low_um: judged.roundness_um(0.05, &below)?,
         roundness_median_um: judged.roundness_um(0.5, &below)?,
         roundness_high_um: judged.roundness_um(0.95, &below)?,
@@ -153,7 +151,7 @@ pub(in crate::ring_roundness) fn conformance(
         share_common_to_all: contributions.iter().filter(is_common).filter_map(|one| one.share_of_variance).sum(),
         contributions,
         rings_cut: u32::try_from(sampled.asked()).unwrap_or(u32::MAX),
-        linear_probability: bounded(normal_below(surface.at_point()[0] / length.max(1e-9))),
+        linear_probability: bounded(normal_below(stated / length.max(1e-9))),
     })
 }
 
@@ -165,19 +163,21 @@ struct Stage<'a> {
 }
 
 impl Judged<'_> {
-    /// The response surface of the margin over the quantities, phases as the job states them.
+    /// The response surface of the margin over the quantities, phases as the job states them; those between bounds come last.
     fn surface(&self) -> Result<Surface, Failure> {
-        let count = self.of.count();
+        let with_distribution = self.of.count();
+        let count = with_distribution + self.of.within.len();
         let mut cut = 0.0;
         let all = (1 + 2 * count + count * count.saturating_sub(1) / 2) as f64;
         Surface::of(&vec![true; count], &mut |x| {
+            let (x, places) = x.split_at(with_distribution);
             // Effects are off by multiples of their standard deviation.
             let value = |(place, x): (usize, &f64)| {
                 self.of.of.get(place).map_or(*x, |one| value_at(one.quantity, &one.distribution, *x))
             };
             let values: Vec<f64> = x.iter().enumerate().map(value).collect();
             // At phases as the job states them.
-            let margin = self.margin(&values, [f64::NEG_INFINITY; PHASES])?;
+            let margin = self.margin(&self.of.held(places), &values, [f64::NEG_INFINITY; PHASES])?;
             cut += 1.0;
             self.report(SURFACE_SHARE * cut / all);
             Ok(vec![margin])
@@ -190,7 +190,51 @@ impl Judged<'_> {
         let one = |(place, value): (usize, f64)| {
             self.of.of.get(place).map_or(value, |one| coordinate(one.quantity, &one.distribution, value))
         };
-        values.into_iter().enumerate().map(one).collect()
+        values.into_iter().enumerate().map(one).chain(of.places()).collect()
+    }
+
+    /// The margin by the response surface.
+    fn near(&self, surface: &Surface, of: &Uncertainties<RingQuantity>, g: &[f64]) -> f64 {
+        surface.at(&self.coordinates(of, g)).first().copied().unwrap_or(-FAR)
+    }
+
+    /// Change of that with every independent score.
+    fn slopes(&self, surface: &Surface, of: &Uncertainties<RingQuantity>) -> Vec<f64> {
+        let count = of.dimensions();
+        let change = |index: usize| {
+            let at = |score: f64| {
+                let mut g = vec![0.0; count + PHASES];
+                g[index] = score;
+                self.near(surface, of, &g)
+            };
+            at(0.5) - at(-0.5)
+        };
+        (0..count).map(change).collect()
+    }
+
+    fn effort(&self) -> Effort {
+        Effort { seed: self.job.uncertainty.seed, most_lines: MOST_LINES }
+    }
+
+    /// The probability that the margin is above `least`, by the response surface alone.
+    fn by_surface(&self, surface: &Surface, of: &Uncertainties<RingQuantity>, least: f64) -> Result<f64, Failure> {
+        // Lines run as about the stated widths, so that those of other widths are compared on the same.
+        let slopes = self.slopes(surface, &self.of.held(&of.places()));
+        let axis: Vec<f64> = slopes.into_iter().chain([0.0; PHASES]).collect();
+        let question = Question { axis: &axis, sets: [0..=0], effort: self.effort(), monitor: self.share.monitor };
+        Ok(question.of(&mut |g: &[f64]| Ok([self.near(surface, of, g) - least]))?.of[0].probability)
+    }
+
+    /// The probability that the tolerance is kept, and the rings that were turned for it.
+    fn found(&self, surface: &Surface) -> Result<(Sampled, Estimate), Failure> {
+        let own = |g: &[f64]| self.near(surface, &self.of, g);
+        let nearly = |least: f64| self.by_surface(surface, &self.of, least);
+        let mut real = |points: &[Vec<f64>]| self.margins(points);
+        let dimensions = self.of.dimensions() + PHASES;
+        let how = (dimensions, self.effort());
+        let sampled = Sampled::until((ENOUGH, MOST_RINGS), how, (&own, &nearly), &mut real)?;
+        let found = sampled.kept(0.0, &own, &nearly)?;
+        Ok((sampled, found))
     }
 
     /// Margins at many points of independent scores.
@@ -201,7 +245,7 @@ impl Judged<'_> {
             let count = self.of.dimensions();
             all.extend(side_by_side(some, |g| {
                 let values = self.of.values(&g[..count]);
-                self.margin(&values, std::array::from_fn(|phase| g[count + phase]))
+                self.margin(&self.of, &values, std::array::from_fn(|phase| g[count + phase]))
             })?);
             let cut = self.cut.fetch_add(some.len(), Ordering::Relaxed) + some.len();
             self.report(SURFACE_SHARE + (1.0 - SURFACE_SHARE) * (cut as f64 / MOST_CUT).min(1.0));
@@ -214,10 +258,10 @@ impl Judged<'_> {
     }
 
     /// By how much the limit is kept, as a logarithm; of a ring that does not rest or is not touched it is not.
-    fn margin(&self, values: &[f64], phases: [f64; PHASES]) -> Result<f64, Failure> {
-        let effects = self.of.effects.effects(&self.job.effects, self.of.of_effects(values))?;
+    fn margin(&self, of: &Uncertainties<RingQuantity>, values: &[f64], phases: [f64; PHASES]) -> Result<f64, Failure> {
+        let effects = of.effects.effects(&self.job.effects, of.of_effects(values))?;
         let Some(stage) = self.stage(effects.as_deref())? else { return Ok(-FAR) };
-        let Some(drawn) = drawn(&stage.scene, &stage.end, &self.of, values, phases) else { return Ok(-FAR) };
+        let Some(drawn) = drawn(&stage.scene, &stage.end, of, values, phases) else { return Ok(-FAR) };
         let mean = stage.blank_mm.iter().sum::<f64>() / stage.blank_mm.len() as f64;
         let mut blank: Vec<f64> = stage.blank_mm.iter().map(|radius| mean + drawn.waves * (radius - mean)).collect();
         let count = blank.len();

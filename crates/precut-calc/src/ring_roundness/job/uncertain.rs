@@ -159,7 +159,7 @@ pub(in crate::ring_roundness) fn drawn(
     values: &[f64],
     phases: [f64; PHASES],
 ) -> Option<Drawn> {
-    let value = |quantity| of.of.iter().zip(values).find(|(one, _)| one.quantity == quantity).map(|(_, value)| *value);
+    let value = |quantity| of.drawn(values).find(|(own, _)| *own == quantity).map(|(_, value)| value);
     let angle_rad = |quantity| value(quantity).unwrap_or(0.0).to_radians();
     let factor = |quantity| value(quantity).unwrap_or(1.0);
     // Seen in the mirror, angles run the other way.
