@@ -319,14 +319,14 @@ fn allowed<M: Diagnosable>(bound: &Bound<'_, M>, cuts: usize) -> Result<Vec<f64>
 mod tests {
     use super::*;
 
-    fn cut(margin: f64, heard_hz: f64) -> Option<Outlook> {
-        Some(Outlook { margin, scatter: 0.05, heard: vec![heard_hz.ln()], heard_scatter: 0.01 })
+    fn cut(margin: f64, heard_hz: f64) -> Outlook {
+        Outlook { margin, scatter: 0.05, heard: vec![heard_hz.ln()], heard_scatter: 0.01 }
     }
 
     /// Two sets alike likely, each of one size, and what they foresee of four cuts.
     fn outlooks() -> Outlooks {
-        let one = vec![cut(0.1, 800.0), cut(1.0, 800.0), cut(-1.0, 800.0), None];
-        let other = vec![cut(0.1, 800.0), cut(-1.0, 900.0), cut(-1.0, 900.0), cut(0.1, 800.0)];
+        let one = vec![Some(cut(0.1, 800.0)), Some(cut(1.0, 800.0)), Some(cut(-1.0, 800.0)), None];
+        let other = [cut(0.1, 800.0), cut(-1.0, 900.0), cut(-1.0, 900.0), cut(0.1, 800.0)].map(Some).to_vec();
         Outlooks { sets: vec![vec![one], vec![other]], now: vec![vec![0.5], vec![0.5]], leader: 0, rival: 1 }
     }
 
@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn what_may_be_seen_has_a_probability_of_one_in_all() {
         for own in [cut(0.03, 700.0), cut(-0.2, 700.0)] {
-            let whole: f64 = expected(&own.unwrap()).iter().map(|(share, _)| share).sum();
+            let whole: f64 = expected(&own).iter().map(|(share, _)| share).sum();
             assert!((whole - 1.0).abs() < 1e-12);
         }
     }
