@@ -224,11 +224,16 @@ pub(crate) fn with_largest(said: Message, contributions: &[Contribution]) -> Mes
 
 /// The warning where a probability is less than wanted.
 pub(crate) fn improbable(code: &'static str, joint: &JointlyKept) -> Option<Finding> {
-    (!joint.met).then(|| {
-        Finding::new(code, "/uncertainty/wanted_probability")
-            .measured(joint.probability, joint.wanted, "1")
-            .with("percent", 100.0 * joint.probability)
-            .with("wanted_percent", 100.0 * joint.wanted)
+    if joint.met {
+        return None;
+    }
+    let said = Finding::new(code, "/uncertainty/wanted_probability")
+        .measured(joint.probability, joint.wanted, "1")
+        .with("percent", 100.0 * joint.probability)
+        .with("wanted_percent", 100.0 * joint.wanted);
+    Some(match joint.probability_most {
+        Some(most) => said.with("most_percent", 100.0 * most),
+        None => said,
     })
 }
 
@@ -314,4 +319,21 @@ pub struct ConformanceMethod {
     /// Seed of the points.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub seed: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_within_bounds_tells_the_most_as_well() {
+        let estimate = Estimate { probability: 0.7, error: 0.001 };
+        let joint = JointlyKept::of(estimate, 0.9);
+        let most =
+            |joint: &JointlyKept| improbable("improbable", joint).map(|said| said.values.get("most_percent").cloned());
+        assert_eq!(most(&joint), Some(None));
+        let within = joint.least(0.99, IntervalSearch::Ends);
+        assert_eq!(most(&within), Some(Some(99.0.into())));
+        assert_eq!(most(&JointlyKept { met: true, ..within }), None);
+    }
 }

@@ -1,7 +1,7 @@
 //! What is said of the probability that diameters keep their limits.
 
 use crate::calculator::{Finding, Message};
-use crate::certainty::{Conformance, Improvement, with_largest, with_most};
+use crate::certainty::{Conformance, Improvement, improbable, with_largest, with_most};
 
 use super::{Asked, acceptance};
 
@@ -49,13 +49,6 @@ pub(crate) fn warnings(asked: &Asked<'_>, conformance: &Conformance) -> Vec<Find
     if let (Some(gauge), Some(width_um), None) = (&asked.uncertainty.measurement, width_um, &conformance.acceptance) {
         found.push(acceptance::none_left(gauge.standard_uncertainty_um, width_um));
     }
-    if !joint.met {
-        found.push(
-            Finding::new("improbable", "/uncertainty/wanted_probability")
-                .measured(joint.probability, joint.wanted, "1")
-                .with("percent", 100.0 * joint.probability)
-                .with("wanted_percent", 100.0 * joint.wanted),
-        );
-    }
+    found.extend(improbable("improbable", joint));
     found
 }
