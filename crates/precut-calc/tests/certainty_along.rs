@@ -98,6 +98,9 @@ fn what_cannot_be_along_a_shaft_is_refused() {
     even["distribution"] = json!({ "kind": "uniform", "half_width_um": 10.0 });
     assert_eq!(refused(even, none()), ["level_of_quantity"]);
     assert_eq!(refused(quantity("place", None), none()), ["correlation_length_missing"]);
+    // Of 600 mm.
+    assert_eq!(refused(quantity("place", Some(29.9)), none()), ["correlation_length_too_short"]);
+    assert!(refused(quantity("place", Some(30.1)), none()).is_empty());
     assert_eq!(refused(quantity("part", Some(80.0)), none()), ["correlation_length_unused"]);
     let pair = json!([{ "between": ["spindle_scatter", "force"], "coefficient": 0.5 }]);
     assert_eq!(refused(quantity("place", Some(80.0)), pair), ["place_correlated"]);

@@ -37,8 +37,8 @@ pub(crate) struct Asked<'a> {
     pub(crate) effects: &'a [DeflectionEffect],
     /// The least shift of the aim that is worth saying, um; none where the job has no aim that could be another one.
     pub(crate) open_aim_um: Option<f64>,
-    /// Whether errors may be new at every place along the part.
-    pub(crate) has_places: bool,
+    /// Length over which errors may be new at every place of the part, mm; none where they may not.
+    pub(crate) places_over_mm: Option<f64>,
 }
 
 /// Parts as a calculator cuts them.

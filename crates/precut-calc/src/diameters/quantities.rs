@@ -25,6 +25,7 @@ pub(crate) const CODES: &[&str] = &[
     "limits_crossed",
     "level_of_quantity",
     "correlation_length_missing",
+    "correlation_length_too_short",
     "correlation_length_unused",
     "place_correlated",
 ];
@@ -389,13 +390,20 @@ fn check_levels(asked: &Asked<'_>, violations: &mut Violations) {
             continue;
         }
         let is_normal = matches!(one.distribution, Distribution::Normal { .. });
-        violations.require(asked.has_places && one.quantity.varies_along() && is_normal, || {
+        violations.require(asked.places_over_mm.is_some() && one.quantity.varies_along() && is_normal, || {
             Finding::new("level_of_quantity", at("level"))
                 .with("quantity", one.quantity.name())
-                .with("has_places", if asked.has_places { "yes" } else { "no" })
+                .with("has_places", if asked.places_over_mm.is_some() { "yes" } else { "no" })
         });
         violations.require(length.is_some(), || {
             Finding::new("correlation_length_missing", at("correlation_length_mm"))
+                .with("quantity", one.quantity.name())
+        });
+        let (length_mm, least_mm) =
+            (length.unwrap_or(f64::MAX), along::least_length_mm(asked.places_over_mm.unwrap_or(0.0)));
+        violations.require(length_mm >= least_mm, || {
+            Finding::new("correlation_length_too_short", at("correlation_length_mm"))
+                .measured(length_mm, least_mm, "mm")
                 .with("quantity", one.quantity.name())
         });
     }

@@ -317,7 +317,7 @@ impl Job {
             uncertainty: &self.uncertainty,
             effects: &self.effects,
             open_aim_um: is_open.then_some(self.path.increment_um),
-            has_places: true,
+            places_over_mm: Some(self.shaft.known_length_mm().unwrap_or(0.0)),
         }
     }
 }

@@ -108,7 +108,7 @@ impl Job {
     /// What it asks of the diameters that it makes.
     pub(crate) fn asked(&self) -> Asked<'_> {
         let Self { tolerance, uncertainty, effects, .. } = self;
-        Asked { tolerance, uncertainty, effects, open_aim_um: None, has_places: false }
+        Asked { tolerance, uncertainty, effects, open_aim_um: None, places_over_mm: None }
     }
 
     /// What holds the blank and what pushes it, where the job says by which forces.
