@@ -89,8 +89,8 @@ pub trait Diagnosable:
         monitor: &dyn Monitor,
     ) -> Result<NextRuns<Self::Run, Self::Point>, Failure>;
 
-    /// Of a quantity that is a class: what may be seen of every row, each a cut of its own, with these effects; a row that cannot be
-    /// computed is `None`. `None` of all where a model tells no more than the margin that it predicts.
+    /// What a person may see of every cut with these effects, where the quantity is a class and every row a cut. A row is `None`
+    /// where its cut cannot be computed; the whole is `None` where the model predicts nothing beside the margin.
     fn outlooks(
         _prepared: &Self::Prepared,
         _allowances: &Self::Allowances,
@@ -275,7 +275,7 @@ pub struct NextRun<R, P> {
     pub points: Vec<P>,
 }
 
-/// What may be seen of a cut: its class, and beside one that is not quiet a value.
+/// What may be seen of a cut: its class, and a value where it is not quiet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlook {
     /// Its margin, and the standard deviation of its scatter.

@@ -1,8 +1,9 @@
 //! The least and the largest probability while some quantities are anywhere within bounds (`certainty/1.2`).
 //!
-//! Looked at are the middle, the ends of every quantity with all others in the middle, then, for the least and for the most on its own,
-//! all three of every quantity from the best place so far until none is better, and a tenth before the ends found. A probability that rises
-//! or falls all along on every one of these lines has its extremes at the ends. Where it does not, the places found are the starts of a search by golden section.
+//! The search evaluates the middle, and the ends of every quantity with all others in the middle. From the best of these it goes to
+//! the best of the three places of every quantity until none is better, once for the least and once for the most, and evaluates a
+//! tenth before the ends that it found. A probability that rises or falls all along on each of these lines has its extremes at the
+//! ends. Where it turns, a golden section goes on from the places that were found.
 
 use crate::calculator::Failure;
 
@@ -43,8 +44,8 @@ impl<Q: Quantity> Uncertainties<Q> {
         extremes(count, &mut |places| at(&self.held(places))).map(Some)
     }
 
-    /// What the quantities between bounds, which are held where a probability is least, add to the doubt: by `at`, with half of the
-    /// interval of each (what has one name is one), all others where they are.
+    /// What each quantity between bounds adds to the doubt: the probability (`at`) with half of its interval, all others where they
+    /// are held. Quantities of one name count as one.
     pub(crate) fn contributions_within(
         &self,
         probability: f64,
@@ -68,7 +69,7 @@ impl<Q: Quantity> Uncertainties<Q> {
     }
 }
 
-/// What has been looked at.
+/// The places that were evaluated.
 struct Looked<'a, 'f> {
     at: &'a mut At<'f>,
     known: Vec<(Vec<f64>, f64)>,
@@ -76,7 +77,7 @@ struct Looked<'a, 'f> {
     turns: Vec<[bool; 2]>,
 }
 
-/// Of so many quantities; at least one.
+/// The extremes over `count` quantities, which is not 0.
 fn extremes(count: usize, at: &mut At<'_>) -> Result<Extremes, Failure> {
     let mut looked = Looked { at, known: Vec::new(), turns: vec![[false; 2]; count] };
     let middle = vec![0.0; count];

@@ -105,7 +105,7 @@ impl<Q: Quantity> Uncertainties<Q> {
         self.count() == 0 && self.within.is_empty()
     }
 
-    /// What the quantities of the job come to, those between bounds included; `values` are those of all others.
+    /// The value of every quantity of the job: `values` of those with a distribution, then those that are held between bounds.
     pub(crate) fn drawn(&self, values: &[f64]) -> impl Iterator<Item = (Q, f64)> {
         let own = self.of.iter().zip(values).map(|(one, value)| (one.quantity, *value));
         own.chain(self.within.iter().map(Within::value))

@@ -13,7 +13,8 @@ impl Judged<'_> {
         let gauge = self.gauge_um();
         let (errors_um, slopes_um) = (self.stated_um(), &self.slopes.of_um);
         let is_common = |index: usize| self.uncertainties.level(index) == Level::Setup;
-        // What costs much to try is not advised, nor what would have to hold everywhere within bounds. Scores of one level that are correlated with the other have no conditional distribution of that form.
+        // What costs much to try is not advised, nor what would have to hold everywhere within bounds. Scores of one level that are
+        // correlated with the other have no conditional distribution of that form.
         let is_tried = self.uncertainties.scores.is_independent()
             && self.uncertainties.within.is_empty()
             && !self.parts.cost_much();

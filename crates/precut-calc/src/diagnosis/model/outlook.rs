@@ -41,8 +41,6 @@ type Belief = Vec<Vec<f64>>;
 pub(super) struct Told {
     /// Fall of the entropy over the sets, nats.
     pub(super) of_sets: f64,
-    /// Over sets and sizes together.
-    pub(super) of_all: f64,
     /// Logarithm of the Bayes factor between leader and rival where the leader is right.
     pub(super) log_bayes: f64,
 }
@@ -110,28 +108,26 @@ impl Outlooks {
 
     /// What a cut tells by itself; `None` of one that some set does not foresee.
     pub(super) fn told(&self, cut: usize) -> Option<Told> {
-        let (of_sets, of_all) = self.falls(&self.now, cut)?;
-        Some(Told { of_sets, of_all, log_bayes: self.log_bayes(cut)? })
+        Some(Told { of_sets: self.fall(&self.now, cut)?, log_bayes: self.log_bayes(cut)? })
     }
 
     /// The same after other cuts, whose outcomes are not known yet.
     pub(super) fn told_after(&self, before: &[usize], cut: usize) -> Option<f64> {
         let beliefs =
             before.iter().try_fold(vec![(1.0, self.now.clone())], |beliefs, made| self.after(beliefs, *made))?;
-        beliefs.iter().map(|(share, belief)| Some(share * self.falls(belief, cut)?.0)).sum()
+        beliefs.iter().map(|(share, belief)| Some(share * self.fall(belief, cut)?)).sum()
     }
 
-    /// Falls of the entropy over sets, and over sets and sizes: the mean of ln(posterior/prior) over what may be seen.
-    fn falls(&self, belief: &Belief, cut: usize) -> Option<(f64, f64)> {
-        let (mut of_sets, mut of_all) = (0.0, 0.0);
+    /// Fall of the entropy over sets: the mean of ln(posterior/prior) over what may be seen.
+    fn fall(&self, belief: &Belief, cut: usize) -> Option<f64> {
+        let gain = |then: f64, before: f64| if then > 0.0 { then * (then / before).ln() } else { 0.0 };
+        let mut fall = 0.0;
         for (share, posterior) in self.outcomes(belief, cut)? {
-            let gain = |then: f64, before: f64| if then > 0.0 { then * (then / before).ln() } else { 0.0 };
             for (then, before) in posterior.iter().zip(belief) {
-                of_sets += share * gain(then.iter().sum(), before.iter().sum());
-                of_all += share * then.iter().zip(before).map(|(then, before)| gain(*then, *before)).sum::<f64>();
+                fall += share * gain(then.iter().sum(), before.iter().sum());
             }
         }
-        Some((of_sets.max(0.0), of_all.max(0.0)))
+        Some(fall.max(0.0))
     }
 
     /// What may be seen, each with its probability and what is believed then.
@@ -340,7 +336,6 @@ mod tests {
         for number in [1, 2] {
             let told = of.told(number).unwrap();
             assert!((told.of_sets - 2.0_f64.ln()).abs() < 0.02 && told.log_bayes > 4.0, "{number}: {told:?}");
-            assert!((told.of_all - told.of_sets).abs() < 1e-12, "{told:?}");
         }
         // What one set does not foresee tells nothing.
         assert!(of.told(3).is_none());
