@@ -69,6 +69,10 @@ need() { # need COMMAND PACKAGE...: installs the packages unless the command is 
   command -v "$command" >/dev/null || packages "$@"
 }
 
+browser() { # Chromium: the small one that draws no window, or else the whole one
+  (need chromium-headless-shell chromium-headless-shell) || (need chromium chromium) || true
+}
+
 python_tools() { # python_tools [REQUIREMENTS NAME]: prints the folder of Python tools, made from their list once
   local requirements=${1:-tests/tools/requirements.txt} venv stamp
   venv=$(target)/tools/${2:-python}
@@ -153,7 +157,7 @@ step_test() {
   # The documentation's commands are run as they stand; without curl its test fails, the others run.
   (need curl curl) || true
   # So is the workbench in a browser; without one its tests say so and pass, in CI they fail.
-  (need chromium chromium) || true
+  browser
   # Those of many processes give some of them clocks that are wrong by minutes.
   [ -n "$(find /usr/lib -path '*/faketime/libfaketimeMT.so.1' 2>/dev/null)" ] || (packages faketime) || true
   # The tests of the store run over a PostgreSQL, too, and those of many processes start and break one of their own.
@@ -239,7 +243,7 @@ step_clients() {
     tar --extract --directory "$stage"
   node_tools clients/typescript "$stage/clients/typescript"
   # The page of the test in a browser; without one it says so, in CI it fails.
-  (need chromium chromium) || true
+  browser
   log=$(mktemp)
   python_client "$stage/clients/python" "$python" "$precut" >"$log" 2>&1 &
   beside=$!

@@ -122,7 +122,7 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("precut")
     parser.add_argument("schemathesis")
-    parser.add_argument("--examples", type=int, default=60)
+    parser.add_argument("--examples", type=int, default=40)
     parser.add_argument("--thorough", action="store_true")
     parser.add_argument("further", nargs="*")
     arguments = parser.parse_args()

@@ -11,7 +11,7 @@ import { test } from "node:test";
 import { Service, withResolvers } from "./service.mjs";
 
 const LONGEST_MS = 60_000;
-const CHROMIUM = ["chromium", "chromium-browser", "google-chrome"].find(
+const CHROMIUM = ["chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"].find(
   (name) => spawnSync(name, ["--version"]).status === 0,
 );
 const missing = CHROMIUM === undefined && process.env["CI"] !== "true" ? "no Chromium here" : false;
