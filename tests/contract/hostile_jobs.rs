@@ -1,5 +1,4 @@
 //! Jobs at the ends of every range: each is answered with finite numbers or refused with a reason, never our own fault.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use precut::engine::{Body, Error, solve_now};
 use precut::registry::Registry;

@@ -1,5 +1,4 @@
 //! Every field of every calculator says what it is, in which unit, and in which range.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use precut::registry::Registry;
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! The numbers and the equations of every example, per version of its calculator: if they change, the version must rise.
 //!
-//! `PRECUT_WRITE_GOLDEN=1 cargo test --test golden` writes them down anew; the diff belongs to the review.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+//! `PRECUT_WRITE_GOLDEN=1 cargo test --test contract golden` writes them down anew; the diff belongs to the review.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

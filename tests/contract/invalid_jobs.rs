@@ -1,7 +1,6 @@
 //! The reference's impossible jobs: each is refused with its code at its field, among whatever else is wrong.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-#[path = "../crates/precut-calc/tests/support/mod.rs"]
+#[path = "../../crates/precut-calc/tests/support/mod.rs"]
 mod support;
 
 use std::collections::BTreeSet;

@@ -1,7 +1,6 @@
 //! The reference's impossible feed schedules: each is refused at its field, among whatever else is wrong.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-#[path = "../crates/precut-calc/tests/feed_support/mod.rs"]
+#[path = "../../crates/precut-calc/tests/feed_support/mod.rs"]
 mod feed_support;
 
 use feed_support::{reference, renamed, translate};
