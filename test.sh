@@ -103,7 +103,7 @@ node_tools() { # node_tools FROM FOLDER: installs into the folder what FROM/pack
 
 binary() { # prints the path of the debug build, made now
   # Beside a test, as the tests' step builds it: alone its dependencies have fewer features, and are built once more.
-  cargo test "${WORKSPACE[@]}" --no-run --test contract_fields >&2
+  cargo test "${WORKSPACE[@]}" --no-run --test contract >&2
   echo "$(target)/debug/precut"
 }
 

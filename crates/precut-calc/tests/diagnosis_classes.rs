@@ -4,8 +4,9 @@
 use precut_calc::calculator::{
     Design, Failure, Hypothesis, JacobianColumn, Prediction, Range, Smooth, Treatment, Unwatched, Variable,
 };
-use precut_calc::diagnosis::{Data, Effort, Foundation, Layout, Setting, Subject, Weighing, adequacy};
+use precut_calc::diagnosis::{Data, Effort, Foundation, Layout, Setting, Subject, Verdict, Weighing, adequacy};
 use precut_calc::effects::DEFLECTION_CAUSES;
+use precut_trials::Random;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Spread of the margins.
@@ -67,12 +68,17 @@ fn data(sides: Vec<f64>) -> Data {
 
 /// Margins of a scan across the limit, and classes as they fall when the limit lies `shift` away.
 fn scan(count: usize, shift: f64) -> (Vec<f64>, Vec<f64>) {
+    scan_that_scatters(count, shift, SPREAD)
+}
+
+/// The same where margins scatter as far as `spread`.
+fn scan_that_scatters(count: usize, shift: f64, spread: f64) -> (Vec<f64>, Vec<f64>) {
     let base: Vec<f64> = (0..count).map(|i| 0.4 * (i as f64 / (count as f64 - 1.0) - 0.5)).collect();
     // Quantiles of the scatter in an order without pattern: a sample that is as even as can be.
     let normal = Normal::standard();
     let scatter = |i: usize| {
         let turned = (0.5 + 0.618_033_988_749_895 * i as f64).fract();
-        SPREAD * normal.inverse_cdf(turned.clamp(0.01, 0.99))
+        spread * normal.inverse_cdf(turned.clamp(0.01, 0.99))
     };
     let sides = base.iter().enumerate().map(|(i, m)| if m + shift + scatter(i) > 0.0 { 1.0 } else { -1.0 }).collect();
     (base, sides)
@@ -213,4 +219,32 @@ fn the_deviance_is_judged_by_draws_of_the_base() {
         assert_eq!(tests.len(), 1);
         assert!((low..=high).contains(&tests[0].p), "{shift}: {:?}", tests[0]);
     }
+}
+
+/// A shift is likely in both scans. One scatters as the shift foresees, the other four times as far: no limit that moved does that.
+#[test]
+fn a_likely_set_that_classes_speak_against_is_not_named() {
+    for (spread, named) in [(SPREAD, true), (4.0 * SPREAD, false)] {
+        let (base, sides) = scan_that_scatters(120, 0.12, spread);
+        let (verdict, likely) = weighed(&Shifted::new(base, WIDE, 0.0), &data(sides), |weighing| {
+            (weighing.verdict.clone(), weighing.named_sets().next().unwrap().posterior)
+        });
+        assert!(likely > 0.9, "{likely}");
+        assert_eq!(verdict, if named { Verdict::Named(vec![0]) } else { Verdict::Unknown(Vec::new()) });
+    }
+}
+
+/// A set is objected to no more often than the level says where nothing else acts: 4 of 100 at 1 % are three deviations.
+#[test]
+fn a_true_set_is_rarely_objected_to() {
+    let (base, _) = scan(60, 0.0);
+    let student = StudentsT::new(0.0, 1.0, 5.0).unwrap();
+    let mut random = Random::new(9);
+    let objected = (0..100).filter(|_| {
+        let mut scatter = || SPREAD * (3.0_f64 / 5.0).sqrt() * student.inverse_cdf(random.uniform(0.0, 1.0));
+        let sides = base.iter().map(|m| if m + 0.15 + scatter() > 0.0 { 1.0 } else { -1.0 }).collect();
+        let verdict = weighed(&Shifted::new(base.clone(), WIDE, 0.0), &data(sides), |of| of.verdict.clone());
+        verdict == Verdict::Unknown(Vec::new())
+    });
+    assert!(objected.count() <= 4);
 }

@@ -11,7 +11,7 @@ use crate::calculator::{
 };
 use crate::diagnosis::causes::subject::{Belief, Form, Setting, Subject};
 use crate::diagnosis::model::known::{Known, with_numbers};
-use crate::diagnosis::verdict::weigh::Effort;
+use crate::diagnosis::verdict::effort::Effort;
 
 /// From this time of one prediction on, ms, divided differences are one-sided and fewer sets are refined.
 const DEAR_MS: f64 = 5.0;

@@ -6,7 +6,7 @@ use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
 
 use crate::calculator::{ConditionRange, ForwardModel, Measured, MeasuredRow, Measurement};
-use crate::diagnosis::verdict::weigh::LEVEL;
+use crate::diagnosis::verdict::effort::LEVEL;
 use crate::effects::JointUncertainty;
 
 /// Most runs of one diagnosis.

@@ -6,7 +6,8 @@ use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::Belief;
 use crate::diagnosis::model::gain::predicting;
 use crate::diagnosis::model::known::directions;
-use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Likely sets whose limits are drawn together.
 const MOST_SETS: usize = 3;

@@ -15,8 +15,10 @@ use crate::diagnosis::rows::suspect::factors_of;
 use crate::diagnosis::statistics::evidence::{Normal, Scale, Side, log_sum_exp};
 use crate::diagnosis::statistics::likelihood::Likelihood;
 use crate::diagnosis::statistics::whiten::Whitener;
+use crate::diagnosis::verdict::effort::Effort;
 use crate::diagnosis::verdict::foundation::Foundation;
-use crate::diagnosis::verdict::weigh::{Effort, POSSIBLE, Weighing};
+use crate::diagnosis::verdict::judge::POSSIBLE;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Prior of any blunder, relative to none: one table in fifty.
 const PRIOR: f64 = 0.02;

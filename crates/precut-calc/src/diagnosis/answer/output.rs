@@ -296,7 +296,8 @@ pub struct SetReport {
     pub bic: Option<f64>,
     /// Probability that rows scatter so far from this set or farther if nothing else acts: the lesser one of two F tests, of
     /// that part of what it leaves which the scatter was not found from, and, without an order, of what goes smoothly with the
-    /// conditions; below the level a set is not named. Absent where there is nothing to test.
+    /// conditions; of classes that of as odd a look, or odder, of classes drawn from it. Below the level a set is not named.
+    /// Absent where there is nothing to test.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub lack_of_fit_p: Option<f64>,
     /// Root mean square error on data held back, this set fitted anew without each part, in the unit of the quantity;

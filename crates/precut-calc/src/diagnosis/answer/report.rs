@@ -24,10 +24,12 @@ use crate::diagnosis::model::next::{NextMeasurement, next_measurement};
 use crate::diagnosis::rows::data::Data;
 use crate::diagnosis::rows::noise::{NoiseSource, between_sweeps};
 use crate::diagnosis::verdict::adequacy::Test;
+use crate::diagnosis::verdict::effort::Effort;
 use crate::diagnosis::verdict::foundation::Foundation;
 use crate::diagnosis::verdict::identify::{CONFOUNDED_BELOW, twins};
+use crate::diagnosis::verdict::judge::Verdict;
 use crate::diagnosis::verdict::remainder::{RemainderShape, remainder_shape};
-use crate::diagnosis::verdict::weigh::{Effort, Verdict, Weighing};
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Probability of nothing from which on an adequate base leaves no reason to look for blunders.
 const QUIET: f64 = 0.5;

@@ -14,7 +14,8 @@ use crate::diagnosis::rows::outlier::Outliers;
 use crate::diagnosis::rows::suspect::swapped_columns;
 use crate::diagnosis::verdict::adequacy::TestKind;
 use crate::diagnosis::verdict::identify::{COLLINEAR_ABOVE, CONFOUNDED_BELOW};
-use crate::diagnosis::verdict::weigh::{ALARM, UNNAMED, UNNAMED_MATTERS, Weighing};
+use crate::diagnosis::verdict::judge::{ALARM, UNNAMED, UNNAMED_MATTERS};
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Difference of the information criterion that is more than a bare mention (Raftery).
 const BIC_MATTERS: f64 = 2.0;

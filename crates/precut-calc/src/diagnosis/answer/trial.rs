@@ -7,9 +7,10 @@ use crate::diagnosis::base::Bound;
 use crate::diagnosis::calculator::{JobOf, with_measured};
 use crate::diagnosis::causes::subject::{Setting, Subject};
 use crate::diagnosis::statistics::whiten::White;
+use crate::diagnosis::verdict::effort::Effort;
 use crate::diagnosis::verdict::foundation::Foundation;
 use crate::diagnosis::verdict::identify::{distance, from_others};
-use crate::diagnosis::verdict::weigh::{Effort, Weighing};
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Logarithm of the largest evidence that the search finds under a job, up to a constant of its rows: comparable between
 /// jobs that differ only in the causes that they ask for.

@@ -14,7 +14,8 @@ use crate::diagnosis::model::next::NextMeasurement;
 use crate::diagnosis::model::outlying::OutlyingRun;
 use crate::diagnosis::statistics::evidence::quantile;
 use crate::diagnosis::verdict::identify::{Signature, separations};
-use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Leading sets whose signatures and separations are given: those that extend no likelier one.
 const SEPARATED_SETS: usize = 6;

@@ -13,6 +13,8 @@ use crate::diagnosis::statistics::whiten::White;
 const WITH_REMAINDER: usize = 5;
 /// Prior of the remainder beside a set, relative to the set.
 const REMAINDER_PRIOR: f64 = 0.08;
+/// By so much less a fit with free shapes may explain than the mean over their grid, and is taken all the same.
+const PRICE_OF_SHAPES: f64 = 2.0;
 
 /// A set of causes with its posterior.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +51,14 @@ impl Ranking {
 
     pub(in crate::diagnosis) fn fit(&self, members: &[usize]) -> Option<&Fit> {
         self.fits.iter().find(|(of, _)| of == members).and_then(|(_, fit)| fit.as_ref())
+    }
+
+    /// So many of the heaviest sets of several causes that were refined with free shapes.
+    pub(in crate::diagnosis) fn heaviest_with_shapes(&self, count: usize) -> Vec<Vec<usize>> {
+        let has_shapes =
+            |members: &Vec<usize>| members.len() > 1 && self.fit(members).is_some_and(|fit| fit.with_shapes);
+        let sets = self.candidates.iter().map(|candidate| &candidate.members);
+        sets.filter(|members| has_shapes(members)).take(count).cloned().collect()
     }
 
     /// The heaviest sets: so many of all, and so many of each size.
@@ -330,25 +340,35 @@ fn take_if_better(candidate: &mut Candidate, fit: &mut Fit, other: Fit) {
     }
 }
 
-/// Refines from a point of the grids: with free shapes where that explains more than the mean over the grid, else on it.
+/// Refines from a point of the grids: with free shapes where that explains more than the mean over the grid, or, far from linear,
+/// hardly less; else on it.
 fn refine_from_grid(
     candidate: &mut Candidate,
     start: Start,
     linear: &Linear<'_>,
     refinement: &Refinement<'_>,
 ) -> Result<Option<Fit>, Failure> {
-    if linear.has_free_shapes(&candidate.members) {
-        let free = refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled);
-        if let Some(free) = free.filter(|free| free.log_z >= candidate.log_z) {
-            candidate.log_z = free.log_z;
-            return Ok(Some(free));
-        }
+    let free = if linear.has_free_shapes(&candidate.members) {
+        refinement.fit(start.clone(), true)?.filter(|fit| fit.with_shapes && fit.settled)
+    } else {
+        None
+    };
+    let explains_more = |log_z: f64| free.as_ref().is_some_and(|free| free.log_z >= log_z);
+    if explains_more(candidate.log_z) {
+        return Ok(free.inspect(|free| candidate.log_z = free.log_z));
     }
-    Ok(refinement.fit(start, false)?.inspect(|plain| {
-        if candidate.members.iter().all(|&h| linear.has_no_grid(h)) {
-            candidate.log_z = plain.log_z;
-        } else if refinement.nonlinear {
-            candidate.log_z += plain.log_z - candidate.best_log_z;
-        }
-    }))
+    let plain = refinement.fit(start, false)?;
+    let has_no_grid = candidate.members.iter().all(|&h| linear.has_no_grid(h));
+    let on_grid = match &plain {
+        Some(plain) if has_no_grid => plain.log_z,
+        Some(plain) if refinement.nonlinear => candidate.log_z + plain.log_z - candidate.best_log_z,
+        _ => candidate.log_z,
+    };
+    // Shapes that are no part of the grid are known to nobody on it: a size there is as sure as if they were stated.
+    let chosen = if refinement.nonlinear && explains_more(on_grid - PRICE_OF_SHAPES) { free } else { plain };
+    candidate.log_z = match &chosen {
+        Some(fit) if fit.with_shapes => fit.log_z.max(on_grid),
+        _ => on_grid,
+    };
+    Ok(chosen)
 }

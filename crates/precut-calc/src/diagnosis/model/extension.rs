@@ -12,7 +12,8 @@ use crate::diagnosis::causes::subject::{Belief, Setting};
 use crate::diagnosis::model::gain::{Gain, predicting};
 use crate::diagnosis::model::known::{Direction, directions, left_open};
 use crate::diagnosis::model::term::Term;
-use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 use crate::effects::JointUncertainty;
 
 /// How far the average model may be, root mean square in units of the scatter, from the average of what the sets predict.

@@ -6,8 +6,10 @@ use crate::diagnosis::model::outlying::{HeldRun, OutlyingRun, outlying};
 use crate::diagnosis::model::term::Term;
 use crate::diagnosis::rows::noise::between_sweeps;
 use crate::diagnosis::statistics::evidence::quantile;
+use crate::diagnosis::verdict::effort::Effort;
 use crate::diagnosis::verdict::foundation::Foundation;
-use crate::diagnosis::verdict::weigh::{Effort, Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Logarithm of the largest ratio of errors that an interval tells: beyond, nothing is known.
 const MOST_LOG_RATIO: f64 = 10.0;

@@ -13,7 +13,8 @@ use crate::diagnosis::rows::data::{Data, Layout};
 use crate::diagnosis::rows::sparse::Sparse;
 use crate::diagnosis::statistics::whiten::Whitener;
 use crate::diagnosis::verdict::identify::Signature;
-use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Odds that settle a question.
 const SETTLING_ODDS: f64 = 20.0;

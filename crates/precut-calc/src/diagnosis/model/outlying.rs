@@ -6,7 +6,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::diagnosis::model::term::Term;
 use crate::diagnosis::rows::sparse::Sparse;
 use crate::diagnosis::statistics::whiten::Whitener;
-use crate::diagnosis::verdict::weigh::{Verdict, Weighing};
+use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::weigh::Weighing;
 
 /// Runs that it takes to tell which one is odd.
 const LEAST_RUNS: usize = 4;

@@ -5,7 +5,8 @@ use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::{Basis, Belief, Form, digit};
 use crate::diagnosis::model::known::Direction;
 use crate::diagnosis::statistics::discrepancy::{Kind, OfBasis, OfEffect, Remainder};
-use crate::diagnosis::verdict::weigh::{UNNAMED, Verdict, Weighing};
+use crate::diagnosis::verdict::judge::{UNNAMED, Verdict};
+use crate::diagnosis::verdict::weigh::Weighing;
 use crate::num::table::straight;
 
 /// Places between which the term is straight, along a part or over a condition: the fewest of these ...

@@ -1,4 +1,4 @@
-//! Tests of the base on classes, against classes that are drawn from it (`diagnosis/3.11`).
+//! Tests of the base, and of sets of causes, on classes: against classes that are drawn from them (`diagnosis/3.11`).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -27,35 +27,55 @@ const STEP: f64 = 1.0;
 /// What a catalogue lacks is most often off at one speed, or at one depth: of many rows D then rises by little more than its own scatter,
 /// the gain of levels by many times theirs.
 pub(super) fn of_classes(weighing: &Weighing<'_>, sides: &[f64], monitor: &dyn Monitor) -> Result<Vec<Test>, Failure> {
-    let base = Base::of(weighing, sides);
-    let found = base.statistics(&base.log_likelihoods(|row| sides[base.rows[row]]));
+    let margin = |row: usize| weighing.foundation.base[row] / weighing.scatter(row);
+    let margins = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).map(margin).collect();
+    tests(&Foreseen::new(weighing, margins, sides), &weighing.foundation.nuisances, monitor)
+}
+
+/// Probability that classes drawn from these margins are as odd as those seen, or odder, by the test that finds them oddest; doubled
+/// where both are made, so that it is below a level by chance no more often than that (Bonferroni). The margins were fitted to the
+/// classes seen, those that are drawn are not fitted again: what fits is objected to less often than the level says.
+pub(in crate::diagnosis) fn fit_of_classes(
+    weighing: &Weighing<'_>,
+    margins: Vec<f64>,
+    sides: &[f64],
+    monitor: &dyn Monitor,
+) -> Result<Option<f64>, Failure> {
+    let tests = tests(&Foreseen::new(weighing, margins, sides), &weighing.foundation.nuisances, monitor)?;
+    let least = tests.iter().map(|test| test.p).min_by(f64::total_cmp);
+    Ok(least.map(|p| (tests.len() as f64 * p).min(1.0)))
+}
+
+fn tests(foreseen: &Foreseen<'_>, nuisances: &[Sparse], monitor: &dyn Monitor) -> Result<Vec<Test>, Failure> {
+    let found = foreseen.statistics(&foreseen.log_likelihoods());
     let mut random = Pcg64::seed_from_u64(1);
-    let nuisances: Vec<Vec<f64>> = weighing.foundation.nuisances.iter().map(Sparse::dense).collect();
+    let nuisances: Vec<Vec<f64>> = nuisances.iter().map(Sparse::dense).collect();
     let mut larger = vec![0.0; found.len()];
     for _ in 0..DRAWS {
         checkpoint(monitor)?;
-        let drawn = base.statistics(&base.drawn(&nuisances, &mut random));
+        let drawn = foreseen.statistics(&foreseen.drawn(&nuisances, &mut random));
         for (larger, (drawn, found)) in larger.iter_mut().zip(drawn.iter().zip(&found)) {
             *larger += f64::from(u8::from(drawn >= found));
         }
     }
     // Counted with the rows themselves, so that it is never 0.
     let probability = |larger: f64| (larger + 1.0) / (DRAWS as f64 + 1.0);
-    let rows = (base.rows.len() as f64, None);
+    let rows = (foreseen.rows.len() as f64, None);
     let deviance = test(TestKind::Deviance, found[0], rows, probability(larger[0]));
     // Of several groupings the one that is oddest, as many times as likely as there are (Bonferroni).
-    let groupings = base.groupings.len();
+    let groupings = foreseen.groupings.len();
     let oddest = (1..=groupings).min_by(|a, b| larger[*a].total_cmp(&larger[*b]));
     let levels = oddest.and_then(|k| {
-        let groups = (base.groupings[k - 1].len() as f64, None);
+        let groups = (foreseen.groupings[k - 1].len() as f64, None);
         test(TestKind::Levels, found[k], groups, (groupings as f64 * probability(larger[k])).min(1.0))
     });
     Ok(deviance.into_iter().chain(levels).collect())
 }
 
-/// Rows that count, as the base foresees them.
-struct Base {
+/// Rows that count, as the base or a set foresees them.
+struct Foreseen<'a> {
     rows: Vec<usize>,
+    sides: &'a [f64],
     /// Margins in standard deviations of their scatter, and that scatter.
     margin: Vec<f64>,
     scatter: Vec<f64>,
@@ -66,24 +86,23 @@ struct Base {
     classes: Vec<[Vec<f64>; 2]>,
 }
 
-/// Log-likelihood of a row at every level; the one in the middle is that of the base.
+/// Log-likelihood of a row at every level; the one in the middle is that of what is foreseen.
 type OfLevels = Vec<f64>;
 
-impl Base {
-    fn of(weighing: &Weighing<'_>, sides: &[f64]) -> Self {
+impl<'a> Foreseen<'a> {
+    fn new(weighing: &Weighing<'_>, margin: Vec<f64>, sides: &'a [f64]) -> Self {
         let rows: Vec<usize> = (0..weighing.keep.len()).filter(|&row| weighing.keep[row]).collect();
         let scatter: Vec<f64> = rows.iter().map(|&row| weighing.scatter(row)).collect();
-        let of_row = |(&row, scatter): (&usize, &f64)| weighing.foundation.base[row] / scatter;
-        let margin: Vec<f64> = rows.iter().zip(&scatter).map(of_row).collect();
         let is_value: Vec<bool> = rows.iter().map(|&row| link::is_value(sides[row])).collect();
         let groupings = weighing.foundation.data.layout.design.groupings.iter();
         let groupings = groupings.filter_map(|grouping| groups(&grouping.group, &rows, &is_value)).collect();
         let classes = margin.iter().map(|margin| [1.0, -1.0].map(|side| of_levels(side, *margin))).collect();
-        Self { rows, margin, scatter, is_value, groupings, classes }
+        Self { rows, sides, margin, scatter, is_value, groupings, classes }
     }
 
-    /// Of rows with these sides, in the order of `rows`; a value is where it was measured.
-    fn log_likelihoods(&self, side: impl Fn(usize) -> f64) -> Vec<OfLevels> {
+    /// Of the rows as they are, in the order of `rows`; a value is where it was measured.
+    fn log_likelihoods(&self) -> Vec<OfLevels> {
+        let side = |row: usize| self.sides[self.rows[row]];
         let of =
             |row: usize| if self.is_value[row] { of_levels(0.0, self.margin[row]) } else { self.class(row, side(row)) };
         (0..self.rows.len()).map(of).collect()

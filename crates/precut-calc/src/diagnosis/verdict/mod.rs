@@ -2,7 +2,9 @@
 
 pub(super) mod adequacy;
 mod class_tests;
+pub(super) mod effort;
 pub(super) mod foundation;
 pub(super) mod identify;
+pub(super) mod judge;
 pub(super) mod remainder;
 pub(super) mod weigh;

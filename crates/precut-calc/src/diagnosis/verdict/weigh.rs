@@ -1,6 +1,6 @@
-//! From rows to posterior weights and a verdict (`diagnosis/3.5`, `diagnosis/3.7`).
+//! From rows to posterior weights (`diagnosis/3.5`).
 
-use crate::calculator::{Failure, Hypothesis, Monitor, Smooth};
+use crate::calculator::{Failure, Monitor};
 use crate::diagnosis::causes::optima::Peak;
 use crate::diagnosis::causes::profile::{Profile, Profiler};
 use crate::diagnosis::causes::ranking::{Ranking, SetWeight};
@@ -10,174 +10,22 @@ use crate::diagnosis::rows::link;
 use crate::diagnosis::rows::noise::Noise;
 use crate::diagnosis::statistics::discrepancy::{self, Kind, Remainder};
 use crate::diagnosis::statistics::evidence::{Normal, log_sum_exp};
-use crate::diagnosis::statistics::fairness::Left;
 use crate::diagnosis::statistics::likelihood::Likelihood;
 use crate::diagnosis::statistics::whiten::{White, Whitener};
 use crate::diagnosis::verdict::adequacy::{Test, adequacy};
+use crate::diagnosis::verdict::effort::{Effort, OtherOptima};
 use crate::diagnosis::verdict::foundation::Foundation;
+use crate::diagnosis::verdict::judge::Verdict;
 
-/// Probability of a blunder from which on it is told.
-pub(in crate::diagnosis) const POSSIBLE: f64 = 0.1;
-/// Singles with which pairs are made, and pairs with which triples are, where a part of the rows is held back or every
-/// prediction is a simulation; of the whole all singles and more pairs are.
-const LEADING_SINGLES: usize = 6;
-const LEADING_PAIRS: usize = 6;
-const PAIRS_OF_WHOLE: usize = 20;
-/// Pairs that are refined beside those that lead from the base, see [`Effort::beside_fits`].
-const PAIRS_BESIDE_FITS: usize = 12;
 /// A set whose evidence is below that of the leader by no more than this may lead from another of its optima.
 const NEAR: f64 = 2.0;
-/// Sets that are refined about the model itself.
-const LEADERS: usize = 12;
-/// Sets that lead only after the others were refined, and are then refined too.
-const LATE_LEADERS: usize = 6;
-/// Below this posterior of "nothing", something is wrong: an alarm needs a Bayes factor of about nine.
-pub(in crate::diagnosis) const ALARM: f64 = 0.1;
-/// Posterior of the remainder from which on the answer is "not in the catalogue".
-pub(in crate::diagnosis) const UNNAMED: f64 = 0.5;
-/// Posterior from which on a set is named.
-const NAMED: f64 = 0.8;
-/// Posterior from which on a set is named if every likely set contains it.
-const NAMED_IF_COMMON: f64 = 0.5;
-/// Share of the named posterior that the list of likely sets holds.
-const LIKELY: f64 = 0.95;
-/// Posterior of the remainder from which on no set is named: one in ten, as much as "nothing" may have in an alarm.
-pub(in crate::diagnosis) const UNNAMED_MATTERS: f64 = ALARM;
-
-/// Of rows along or round a part the share of the level at which a test speaks against the base. How neighbours hang together is
-/// one number there, found from the rows: where it is a little too small, what goes smoothly looks many times less likely than
-/// it is. Two of forty shafts with nothing hidden are rejected at the level itself.
-const SHARE_OF_LEVEL: f64 = 1e-3;
+/// Sets of several causes that may, too, with whatever evidence: where shapes are free another optimum may have far more. A support
+/// out of place beside a runout at a ratio of 7.94 had 24 less than at 8.09, its best.
+const FAR: usize = 4;
 
 /// Free sizes of a remainder up to which its band is computed: beyond, a triangular solution for every row takes longer
 /// than everything else.
 const MOST_FREE_SIZES: usize = 200;
-
-/// Of which sets other optima are looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OtherOptima {
-    /// Of none.
-    None,
-    /// Of the set that leads.
-    OfLeader,
-    /// Of every single cause, too, and of every set that may yet lead.
-    OfAll,
-}
-
-/// How far the search goes, and how badly a set may fit that is named.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
-    /// Causes at the same time, 0 to 3.
-    pub most_causes: usize,
-    /// Heaviest singles that may have partners, and heaviest pairs that may have a third.
-    pub leading: [usize; 2],
-    /// Sets that are refined about the model itself.
-    pub leaders: usize,
-    /// Of the sets of none, one, two and three causes those that are refined in any case: from the base a single cause
-    /// of a model that is far from linear looks worse than a set that mimics it.
-    pub of_each_size: [usize; 4],
-    /// Pairs that are refined since they explain most where one of both is taken about its own fit.
-    pub beside_fits: usize,
-    /// How often those that lead only after others were refined are refined, too, and how many each time.
-    pub rounds: usize,
-    /// See `rounds`.
-    pub late_leaders: usize,
-    /// Whether the model is far from linear in its sizes: then a refinement takes more steps, and what it changes at
-    /// the best point of a grid corrects the whole grid.
-    pub nonlinear: bool,
-    /// Of which sets other optima are looked for.
-    pub other_optima: OtherOptima,
-    /// Least probability of what a set leaves for it to be named, and of what the base leaves for it to be adequate.
-    pub level: f64,
-    /// Whether a part of the rows is held back: then of classes, whose test of the base draws thousands, it is not tested.
-    pub in_fold: bool,
-}
-
-/// Significance level of the tests unless another is asked for.
-pub(in crate::diagnosis) const LEVEL: f64 = 0.01;
-
-impl Effort {
-    /// The whole search.
-    pub fn full(most_causes: usize) -> Self {
-        Self {
-            most_causes,
-            leading: [usize::MAX, PAIRS_OF_WHOLE],
-            leaders: LEADERS,
-            of_each_size: [0, usize::MAX, 0, 0],
-            beside_fits: 0,
-            rounds: 1,
-            late_leaders: LATE_LEADERS,
-            nonlinear: false,
-            other_optima: OtherOptima::OfLeader,
-            level: LEVEL,
-            in_fold: false,
-        }
-    }
-
-    /// The same in a fold.
-    pub fn fold(most_causes: usize) -> Self {
-        Self {
-            leading: [LEADING_SINGLES, LEADING_PAIRS],
-            of_each_size: [0; 4],
-            in_fold: true,
-            ..Self::full(most_causes)
-        }
-    }
-
-    /// Where every prediction is a simulation: fewer sets. Every single cause is looked for wherever it would be if it were
-    /// asked for alone: a tool that is pushed off looks worse from the base than many that mimic it, and from one frequency a
-    /// second mode is not found that swings at another.
-    pub fn dear(most_causes: usize) -> Self {
-        Self {
-            most_causes,
-            leading: [LEADING_SINGLES, LEADING_PAIRS],
-            leaders: 1,
-            of_each_size: [0, usize::MAX, 3, 1],
-            beside_fits: PAIRS_BESIDE_FITS,
-            rounds: 3,
-            late_leaders: 2,
-            nonlinear: true,
-            other_optima: OtherOptima::OfAll,
-            level: LEVEL,
-            in_fold: false,
-        }
-    }
-
-    /// Where every prediction is a simulation, or else the whole search.
-    pub(in crate::diagnosis) fn of(most_causes: usize, is_dear: bool) -> Self {
-        if is_dear { Self::dear(most_causes) } else { Self::full(most_causes) }
-    }
-
-    /// The same in a fold.
-    pub fn dear_fold(most_causes: usize) -> Self {
-        Self {
-            most_causes,
-            leading: [LEADING_SINGLES, LEADING_PAIRS],
-            leaders: 1,
-            of_each_size: [0, 2, 1, 0],
-            beside_fits: 0,
-            rounds: 1,
-            late_leaders: 1,
-            nonlinear: true,
-            other_optima: OtherOptima::None,
-            level: LEVEL,
-            in_fold: true,
-        }
-    }
-}
-
-/// What the rows say.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Verdict {
-    /// Nothing is wrong that these rows could show.
-    Adequate,
-    /// These causes, by their hypotheses.
-    Named(Vec<usize>),
-    /// One of these sets; the data cannot tell which.
-    Confounded(Vec<Vec<usize>>),
-    /// Something that the catalogue does not hold, beside at least these causes.
-    Unknown(Vec<usize>),
-}
 
 /// All sets of causes weighed against each other, against nothing, and against a remainder without a name.
 pub struct Weighing<'a> {
@@ -190,8 +38,8 @@ pub struct Weighing<'a> {
     pub(in crate::diagnosis) whitener: Whitener,
     pub(in crate::diagnosis) linear: Linear<'a>,
     /// Whitened regressors of an unordered design.
-    low_order: Vec<White>,
-    ranking: Ranking,
+    pub(super) low_order: Vec<White>,
+    pub(super) ranking: Ranking,
     pub(in crate::diagnosis) kinds: Vec<Kind>,
     /// All sets, heaviest first.
     pub sets: Vec<SetWeight>,
@@ -205,6 +53,8 @@ pub struct Weighing<'a> {
     pub inclusion: Vec<f64>,
     /// Tests of the base.
     pub tests: Vec<Test>,
+    /// Of classes: the likely sets by their members, and the probability that what they foresee looks as odd as what was seen.
+    pub(super) fits_of_classes: Vec<(Vec<usize>, Option<f64>)>,
     /// The verdict.
     pub verdict: Verdict,
 }
@@ -246,7 +96,10 @@ impl<'a> Weighing<'a> {
         }
         ranking.refine_parts(&linear, &refinement, monitor)?;
         if effort.other_optima == OtherOptima::OfAll {
-            let is_near = |set: &Candidate, leads: f64| set.members.len() > 1 && set.log_z > leads - NEAR;
+            let heaviest = ranking.heaviest_with_shapes(FAR);
+            let is_near = |set: &Candidate, leads: f64| {
+                set.members.len() > 1 && (set.log_z > leads - NEAR || heaviest.contains(&set.members))
+            };
             ranking.look_elsewhere_of(is_near, &linear, &refinement, monitor)?;
         }
         if effort.other_optima != OtherOptima::None {
@@ -288,79 +141,17 @@ impl<'a> Weighing<'a> {
             log_evidence,
             inclusion,
             tests: Vec::new(),
+            fits_of_classes: Vec::new(),
             verdict: Verdict::Adequate,
         };
         if data.sides.is_none() || !effort.in_fold {
             weighing.tests = adequacy(&weighing, monitor)?;
         }
+        if let (Some(sides), false) = (&data.sides, effort.in_fold) {
+            weighing.fits_of_classes = weighing.tested_on_classes(sides, monitor)?;
+        }
         weighing.verdict = weighing.judged(effort.level);
         Ok(weighing)
-    }
-
-    /// Whether no test says that the base is wrong: neither one of the family, nor what it leaves.
-    fn base_stands(&self, level: f64) -> bool {
-        let is_ordered = self.foundation.data.layout.design.smooth != Smooth::None;
-        let level = if is_ordered { level * SHARE_OF_LEVEL } else { level };
-        let fits = self.sets.iter().find(|set| set.members.is_empty() && set.remainder.is_none());
-        let objects = |test: &Test| test.kind.is_of_base() && test.p_holm < level;
-        !self.tests.iter().any(objects) && fits.is_none_or(|base| self.is_fair(base, level))
-    }
-
-    /// Whether the rows do not object to a set.
-    fn is_fair(&self, set: &SetWeight, level: f64) -> bool {
-        self.lack_of_fit(set).is_none_or(|probability| probability >= level)
-    }
-
-    fn judged(&self, level: f64) -> Verdict {
-        let (none, unnamed) = (self.none, self.unnamed);
-        let quiet = none >= ALARM;
-        if quiet && self.base_stands(level) {
-            return Verdict::Adequate;
-        }
-        // Where rows object to a base that is likely, what is left to choose from is all else.
-        let whole = if quiet { 1.0 - none } else { 1.0 };
-        if unnamed >= UNNAMED * whole {
-            let leading = self.sets.iter().find(|set| set.remainder.is_some());
-            return Verdict::Unknown(leading.map_or_else(Vec::new, |set| set.members.clone()));
-        }
-        let of_named: f64 = self.named_sets().map(|set| set.posterior).sum();
-        let mut likely: Vec<&SetWeight> = Vec::new();
-        let mut held = 0.0;
-        for set in self.named_sets() {
-            if held >= LIKELY * of_named {
-                break;
-            }
-            held += set.posterior;
-            likely.push(set);
-        }
-        if let Some(leader) = likely.first() {
-            let in_all = likely.iter().all(|set| leader.members.iter().all(|h| set.members.contains(h)));
-            let leads = leader.posterior >= NAMED || (leader.posterior >= NAMED_IF_COMMON && in_all);
-            // The best of the catalogue, and the rows still object.
-            if leads && !self.is_fair(leader, level) {
-                return Verdict::Unknown(Vec::new());
-            }
-            // At its limit a size is not what the data ask for: something else acts, or the limit is wrong.
-            let at_limit =
-                self.fit(&leader.members).is_some_and(|fit| at_limit(fit, self.foundation.subject.hypotheses()));
-            if leads && unnamed < UNNAMED_MATTERS && !at_limit {
-                return Verdict::Named(leader.members.clone());
-            }
-        }
-        likely.retain(|set| self.is_fair(set, level));
-        let fair: f64 = likely.iter().map(|set| set.posterior).sum();
-        // Of what is likely by name more than half does not fit.
-        if fair < UNNAMED * held || likely.is_empty() {
-            return Verdict::Unknown(Vec::new());
-        }
-        Verdict::Confounded(likely.iter().map(|set| set.members.clone()).collect())
-    }
-
-    /// Beside rows that may have been written down wrongly no set is named, however much it explains.
-    pub(in crate::diagnosis) fn doubt(&mut self, of_blunders: f64) {
-        if let (true, Verdict::Named(members)) = (of_blunders >= POSSIBLE, &self.verdict) {
-            self.verdict = Verdict::Confounded(vec![members.clone()]);
-        }
     }
 
     /// What every value of every member of a set whose shapes stay on their grid may be, point by point of the grid; `None` of
@@ -415,16 +206,6 @@ impl<'a> Weighing<'a> {
         };
         let free: Vec<usize> = (0..fit.free.len()).filter(of_fit).collect();
         Profiler { refinement: &refinement, fit, dear }.profiles(&free, reach, monitor)
-    }
-
-    /// Probability that rows scatter so far from a set or farther, if nothing else acts; see [`Left::probability`]. `None`
-    /// of classes, and beside a remainder.
-    pub(in crate::diagnosis) fn lack_of_fit(&self, set: &SetWeight) -> Option<f64> {
-        let Likelihood::Gaussian { whitener, .. } = &self.linear.likelihood else { return None };
-        let candidate = self.ranking.candidates.iter().find(|candidate| candidate.members == set.members)?;
-        let (columns, residual, _) = self.ranking.parts(&self.linear, candidate);
-        let left = Left { columns, residual: &residual, rows: whitener.rows(), noise: &self.noise };
-        if set.remainder.is_some() { None } else { left.probability(&self.low_order) }
     }
 
     /// n ln(RSS/n) + k ln n of a set without a remainder, RSS whitened and at the fit without priors. Where it has a
@@ -507,11 +288,6 @@ impl<'a> Weighing<'a> {
     pub fn best_evidence(&self) -> f64 {
         self.ranking.candidates.iter().map(|candidate| candidate.log_z).fold(f64::NEG_INFINITY, f64::max)
     }
-
-    /// Sets without a remainder, heaviest first.
-    pub fn named_sets(&self) -> impl Iterator<Item = &SetWeight> {
-        self.sets.iter().filter(|set| set.remainder.is_none() && !set.members.is_empty())
-    }
 }
 
 /// What classes tell of margins near those of the leading set.
@@ -534,18 +310,4 @@ fn about_leader(
         None => noise.clone(),
     };
     Ok(Whitener::new(foundation.data, &informed, &foundation.nuisances, keep))
-}
-
-/// Whether the size of a cause lies at its physical limit; absent, at 0, is no limit, and of several sizes
-/// of one cause the first counts.
-fn at_limit(fit: &Fit, hypotheses: &[Hypothesis]) -> bool {
-    fit.settings.iter().any(|setting| {
-        let hypothesis = &hypotheses[setting.hypothesis];
-        hypothesis.amplitudes().next().is_some_and(|(index, _)| {
-            let (range, value) = (hypothesis.variables[index].range, setting.values[index]);
-            let near = |bound: f64| (value - bound).abs() < 1e-9 * (range.upper - range.lower);
-            let is_absent = range.lower + hypothesis.counted_from(index) >= 0.0;
-            (near(range.lower) && !is_absent) || near(range.upper)
-        })
-    })
 }
