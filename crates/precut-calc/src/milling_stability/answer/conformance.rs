@@ -197,7 +197,7 @@ impl There<'_> {
     /// By how much the limits are kept, as logarithms.
     fn margins(&self, factors: &[f64]) -> Result<Margins<LIMITS>, Failure> {
         let Judged { study, limits, .. } = self.of;
-        let drawn = drawn(&study.case, &self.of.of, factors);
+        let drawn = drawn(study.job, &study.case, &self.of.of, factors)?;
         let cut = Cut {
             milling: &drawn.milling,
             structure: &drawn.structure,
@@ -256,7 +256,7 @@ impl There<'_> {
         let Some((held, force_n)) = &self.of.held else { return Ok(f64::INFINITY) };
         let scaled = |load: &Load| Load { force_n: load.force_n.map(|part| part * drawn.force), ..*load };
         let loads = match &self.loads {
-            Some(loads) if !drawn.has_other_teeth => loads.iter().map(scaled).collect(),
+            Some(loads) if drawn.has_scaled_loads => loads.iter().map(scaled).collect(),
             _ => self.of.study.loads_of(held, cut)?,
         };
         let Ok(loaded) = held.rest.loaded(&held.fixture, &loads, 1.0) else { return Ok(f64::NEG_INFINITY) };
