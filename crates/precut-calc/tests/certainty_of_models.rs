@@ -7,6 +7,8 @@
 use crate::deflection_uncertainty::cut_with;
 use crate::draw::Draw;
 use crate::fixture_support::{checked, outcome, with};
+use crate::milling_answers::{merged, solve};
+use crate::milling_certainty::{conformance as of_cut, how_sure, is_quiet as is_quiet_cut};
 use crate::ring_support;
 use crate::support::solved;
 use precut_calc::fixture_stability::multiplier_modulus;
@@ -302,6 +304,47 @@ fn is_quiet(job: &Value) -> bool {
     let clamp = outcome(&job).clamp.unwrap();
     let given = number(&job, "/fixture/clamp_force_n");
     modulus < 1.0 && given >= clamp.least_n.unwrap() && clamp.slip.unwrap().holds.unwrap()
+}
+
+/// Cuts of which a diagnosis told frequency, damping and force, drawn from what it leaves open and solved one by one.
+#[test]
+fn cuts_of_a_posterior_stay_quiet_as_often_as_said() {
+    let cuts = std::env::var("PRECUT_CERTAINTY_CUTS").map_or(40, |count| count.parse().unwrap());
+    let effects = json!([
+        { "kind": "mode_frequency", "mode": 1, "factor": 1.01 },
+        { "kind": "mode_damping", "mode": 1, "factor": 1.2 },
+        { "kind": "force_coefficient", "factor": 1.05 }
+    ]);
+    // A mode that is damped more goes with a larger force, as a log of classes leaves it open.
+    let open = open(&[
+        &[by(2, "factor", 0.15), by(3, "factor", 0.12)],
+        &[by(1, "factor", 0.012), by(3, "factor", -0.03)],
+        &[by(2, "factor", 0.1)],
+    ]);
+    let mut draw = Draw::new(41);
+    for depth in [2.8, 3.2] {
+        let job = how_sure(&json!({ "cut": { "depth_mm": depth }, "spindle": { "power_kw": 0.9 }, "effects": effects,
+            "uncertainty": { "quantities": [], "defaults": false, "effects": open } }));
+        let found = of_cut(&job);
+        let (told, error) = (found.joint.probability, found.joint.numerical_error);
+        let plain = merged(job, &json!({ "analyses": ["verdict"], "uncertainty": null }));
+        let quiet = (0..cuts).filter(|_| {
+            let scores: Vec<f64> = (0..3).map(|_| normal(&mut draw)).collect();
+            let drawn = with(&plain, "/effects", off(&effects, &open, &scores));
+            is_quiet_cut(&drawn, &solve(&drawn).outcome)
+        });
+        let share = quiet.count() as f64 / f64::from(cuts);
+        eprintln!("{depth} mm: told {told:.4} +- {error:.4}, quiet {share:.4} of {cuts}");
+        assert!(told > 0.05 && told < 0.995, "{depth}: {told}");
+        let deviation = (told * (1.0 - told) / f64::from(cuts)).sqrt();
+        assert!((share - told).abs() < 2.5 * deviation + error, "{depth}: {share}, told {told}");
+        let mut names: Vec<&str> = found.contributions.iter().map(|one| one.quantity.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!(
+            names,
+            ["model:force_coefficient/factor", "model:mode_damping/factor", "model:mode_frequency/factor"]
+        );
+    }
 }
 
 /// Rings of which a diagnosis told push-off, a wave of the blank and a roller, turned one by one.

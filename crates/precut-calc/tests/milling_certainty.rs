@@ -101,7 +101,7 @@ fn drawn(job: &Value, draw: &mut Draw) -> Value {
 }
 
 /// Whether everything holds that the verdict asks about, at the likely friction.
-fn is_quiet(job: &Value, of: &Outcome) -> bool {
+pub(crate) fn is_quiet(job: &Value, of: &Outcome) -> bool {
     let grows = of.multiplier.as_ref().is_some_and(|multiplier| multiplier.modulus >= 1.0);
     let overloaded = of.verdict.as_ref().unwrap().drive_margin.is_some_and(|margin| margin < 1.0);
     let most = job["limits"]["amplitude_max_um"].as_f64().unwrap_or(f64::INFINITY);
@@ -228,6 +228,65 @@ fn measured_modes_bring_their_own_scatter() {
         assert_eq!(source(&format!("tool_mode_{part}")), Source::Measured);
         assert_eq!(source(&format!("work_mode_{part}")), Source::Default);
     }
+}
+
+/// What a diagnosis leaves open of the force counts in place of what is usual: the limit goes with one over a normal factor.
+#[test]
+fn what_a_model_leaves_open_counts() {
+    let (factor, by) = (1.1, 0.1);
+    let of = |depth_mm: f64, quantities: &Value, parameter: &str| {
+        how_sure(&json!({
+            "cutter": { "helix_angle_deg": 0 }, "spindle": null, "analyses": ["certainty", "intervals"],
+            "cut": { "depth_mm": depth_mm }, "effects": [{ "kind": "force_coefficient", "factor": factor }],
+            "uncertainty": { "quantities": quantities, "defaults": false,
+                "effects": [{ "moves": [{ "effect": 1, "parameter": parameter, "by": by }] }] }
+        }))
+    };
+    let limit = solve(&of(1.0, &json!([]), "factor")).outcome.first_limit_mm.unwrap();
+    for score in [-1.0, 0.5, 2.0] {
+        let found = conformance(&of(limit * factor / (factor + by * score), &json!([]), "factor"));
+        // As of a factor that the job states.
+        assert!((found.joint.probability - below(score)).abs() < 5e-4, "{score}: {:?}", found.joint);
+        let [one] = &found.contributions[..] else { panic!("{:?}", found.contributions) };
+        assert_eq!((one.quantity.as_str(), one.source), ("model:force_coefficient/factor", Source::Model));
+        let halved = one.joint_probability_if_halved.unwrap();
+        assert!((halved - below(2.0 * score)).abs() < 1e-3, "{score}: {halved}");
+    }
+    let refused = |quantities: &Value, parameter: &str| {
+        let codes: Vec<_> = faults(&of(1.0, quantities, parameter)).into_iter().map(|fault| fault.code).collect();
+        codes
+    };
+    assert_eq!(refused(&json!([lognormal("cutting_force", 0.1)]), "factor"), ["duplicate_quantity"]);
+    assert_eq!(refused(&json!([]), "nothing"), ["unknown_parameter"]);
+}
+
+/// Of one mode a model tells in place of what is usual of this mode alone.
+#[test]
+fn what_a_model_tells_of_a_mode_is_of_that_mode() {
+    let of = |quantities: &Value, modes: &[u32]| {
+        let effects: Vec<Value> =
+            modes.iter().map(|mode| json!({ "kind": "mode_damping", "mode": mode, "factor": 1.0 })).collect();
+        let open: Vec<Value> = (1..=modes.len())
+            .map(|effect| json!({ "moves": [{ "effect": effect, "parameter": "factor", "by": 0.1 }] }))
+            .collect();
+        merged(
+            example("two_modes"),
+            &json!({ "analyses": ["certainty"], "lobes": null, "cut": { "depth_mm": 0.6 }, "effects": effects,
+                "uncertainty": { "quantities": quantities, "effects": open } }),
+        )
+    };
+    let found = conformance(&of(&json!([]), &[1]));
+    let names: Vec<&str> = found.contributions.iter().map(|one| one.quantity.as_str()).collect();
+    for name in ["model:mode_damping/factor", "tool_mode_damping", "tool_mode_frequency"] {
+        assert!(names.contains(&name), "{name}: {names:?}");
+    }
+    let stated = json!([lognormal("mode_damping", 0.2)]);
+    assert!(faults(&of(&stated, &[1])).is_empty());
+    let count =
+        ["tool", "work"].iter().map(|side| example("two_modes")[side]["modes"].as_array().map_or(0, Vec::len)).sum();
+    let all: Vec<u32> = (1..).take(count).collect();
+    let codes: Vec<_> = faults(&of(&stated, &all)).into_iter().map(|fault| fault.code).collect();
+    assert_eq!(codes, ["duplicate_quantity"]);
 }
 
 #[test]

@@ -10,6 +10,7 @@ pub(crate) mod block;
 pub(crate) mod bounds;
 pub(crate) mod deepest;
 mod distribution;
+pub(crate) mod judging;
 mod line;
 pub(crate) mod lines;
 pub(crate) mod open;

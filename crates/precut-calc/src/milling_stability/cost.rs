@@ -172,10 +172,10 @@ fn cost_of_modes(job: &Job) -> Cost {
 /// Of the probability: draws of the real model, each with its multiplier, its motion and its loads as far as they are limited.
 fn certainty_ms(job: &Job, case: &Case) -> f64 {
     let Ok(of) = uncertainties(job, &case.structure, &[]) else { return 0.0 };
-    let within = of.within.iter().map(|one| &one.of);
-    let mut names: Vec<&str> = of.of.iter().chain(within).map(|one| one.quantity.name()).collect();
-    names.sort_unstable();
-    names.dedup();
+    let mut within: Vec<&str> = of.within.iter().map(|one| one.of.quantity.name()).collect();
+    within.sort_unstable();
+    within.dedup();
+    let names = of.named().len() + within.len();
     let limits = &job.limits;
     let moves = [limits.amplitude_max_um, limits.surface_error_max_um, limits.roughness_max_um];
     let motion_ms = if moves.iter().any(Option::is_some) { by_elements_ms(case, &case.rotation) } else { 0.0 };
@@ -185,6 +185,5 @@ fn certainty_ms(job: &Job, case: &Case) -> f64 {
         let places = of.places_mm(job.cut.feed_direction_deg).map_or(1, |places| places.len());
         places as f64 * CLAMPING_MS * loads
     });
-    draws([of.of.len(), of.within.len()], names.len())
-        * (ON_MAP * point_ms(case, &case.rotation) + motion_ms + clamping_ms)
+    draws([of.count(), of.within.len()], names) * (ON_MAP * point_ms(case, &case.rotation) + motion_ms + clamping_ms)
 }

@@ -53,7 +53,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 7,
+        version: 8,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \
@@ -250,6 +250,7 @@ const CODES: Codes = Codes {
         DISTRIBUTION_CODES,
         QUANTITY_CODES,
         MISSING_CODES,
+        crate::certainty::open::CODES,
     ],
     failures: &[FAILURE_CODES, &["effect_without_mode", "strip_misses_cutter"]],
     warnings: &[advice::WARNING_CODES, FIT_WARNING_CODES, IMPROBABLE_CODES],

@@ -4,13 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message, Monitor};
-use crate::certainty::around::{Around, Asked, Real, far};
-use crate::certainty::bounds::Extremes;
+use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
+use crate::certainty::judging::{Judging, Told};
 use crate::certainty::lines::{Margins, Together};
-use crate::certainty::{
-    ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, bounded, improbable, probably,
-};
+use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 
 use crate::fixture_stability::answer::study::{forced, has_motion};
 use crate::fixture_stability::job::acting::Case;
@@ -29,10 +27,7 @@ const HELD: usize = 2;
 const NAMES: [(&str, &str); LIMITS] =
     [("stable", "/cut/depth_mm"), ("closed", "/fixture/clamp_force_n"), ("held", "/fixture/clamp")];
 /// Sets of them of which the probability is asked: each alone, then all.
-const SETS: [Together; 4] = [STABLE..=STABLE, CLOSED..=CLOSED, HELD..=HELD, STABLE..=HELD];
-const ALL: usize = 3;
-/// Most lines of one scrambling: of the response surface, and of vises.
-const MOST_LINES: [usize; 2] = [16; 2];
+const SETS: [Together; LIMITS + 1] = [STABLE..=STABLE, CLOSED..=CLOSED, HELD..=HELD, STABLE..=HELD];
 /// Lines of one scrambling on which vises are compared.
 const COMPARED_LINES: usize = 4;
 
@@ -91,10 +86,6 @@ impl<'a> Judged<'a> {
         Ok(Some(Self { job, case, rules, monitor, uncertainties, limits }))
     }
 
-    pub(in crate::fixture_stability) fn uncertainties(&self) -> &Uncertainties<FixtureQuantity> {
-        &self.uncertainties
-    }
-
     /// By how much the limits are kept, as logarithms.
     fn margins(&self, Drawn { case, friction }: &Drawn, working: Working) -> Result<Margins<LIMITS>, Failure> {
         let mut margins = [f64::INFINITY; LIMITS];
@@ -116,97 +107,19 @@ impl<'a> Judged<'a> {
         Ok(margins)
     }
 
-    /// About a working point; `real` are the margins there.
-    fn around<'b>(&'b self, real: &'b Real<'b, LIMITS>) -> Result<Around<'b, FixtureQuantity, LIMITS, 4>, Failure> {
-        Around::of(Asked {
-            uncertainties: &self.uncertainties,
-            limits: &self.limits,
-            sets: SETS,
-            seed: self.job.uncertainty.seed,
-            most_lines: MOST_LINES,
-            monitor: self.monitor,
-            real,
-        })
-    }
-
-    fn tried(&self, factors: &[f64], working: Working) -> Result<Margins<LIMITS>, Failure> {
-        self.margins(&drawn(self.job, self.case, &self.uncertainties, factors)?, working)
-    }
-
-    /// The same with the quantities between bounds where they are held there.
-    fn with(&self, uncertainties: Uncertainties<FixtureQuantity>) -> Self {
-        Self { uncertainties, ..self.clone() }
-    }
-
-    /// Where within bounds the probability is least and most; `None` where there are none.
-    fn extremes(&self, working: Working) -> Result<Option<Extremes>, Failure> {
-        self.uncertainties.extremes(&mut |of| self.with(of.clone()).nearly(working))
-    }
-
-    /// The probability that all limits are kept, by a response surface alone.
-    fn nearly(&self, working: Working) -> Result<f64, Failure> {
-        let real = |factors: &[f64]| self.tried(factors, working);
-        self.around(&real)?.nearly()
-    }
-
     /// The block of the answer. `deepest_mm` where a depth is looked for, too, and how deep.
     pub(in crate::fixture_stability) fn conformance(
         &self,
         deepest_mm: Option<f64>,
     ) -> Result<FixtureConformance, Failure> {
-        let working = self.case.working;
-        let extremes = self.extremes(working)?;
-        let mut told = match &extremes {
-            Some(extremes) => self.with(self.uncertainties.held(&extremes.least)).told(deepest_mm.is_some())?,
-            None => self.told(deepest_mm.is_some())?,
+        let (working, wanted) = (self.case.working, self.job.uncertainty.wanted_probability);
+        let Told { limits, joint, contributions, method } =
+            self.told(working, wanted, deepest_mm.map(|_| COMPARED_LINES))?;
+        let depth_at_wanted_mm = match deepest_mm {
+            Some(deepest_mm) => self.depth_mm(working, wanted, deepest_mm)?,
+            None => None,
         };
-        if let Some(Extremes { most, search, .. }) = &extremes {
-            let most = self.with(self.uncertainties.held(most)).alone(working)?;
-            told.joint = told.joint.least(most, *search);
-        }
-        if let Some(deepest_mm) = deepest_mm {
-            told.depth_at_wanted_mm = self.depth_mm(working, told.joint.wanted, deepest_mm)?;
-        }
-        Ok(told)
-    }
-
-    /// The block with the quantities between bounds where they are, but for the depth.
-    fn told(&self, is_compared: bool) -> Result<FixtureConformance, Failure> {
-        let working = self.case.working;
-        let real = |factors: &[f64]| self.tried(factors, working);
-        let around = self.around(&real)?;
-        let found = around.found()?;
-        let joint = JointlyKept::of(found.of[ALL], self.job.uncertainty.wanted_probability);
-        let mut contributions = around.contributions(&found, is_compared.then_some(COMPARED_LINES))?;
-        contributions.extend(
-            self.uncertainties
-                .contributions_within(joint.probability, &mut |of| self.with(of.clone()).nearly(working))?,
-        );
-        Ok(FixtureConformance {
-            limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
-            joint,
-            contributions,
-            depth_at_wanted_mm: None,
-            method: ConformanceMethod {
-                integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
-                linear_probability: bounded(around.linear_probability()?),
-                seed: self.job.uncertainty.seed,
-            },
-        })
-    }
-
-    /// The probability that all limits are kept at another working point, within bounds the least.
-    pub(in crate::fixture_stability) fn probability(&self, working: Working) -> Result<f64, Failure> {
-        match self.extremes(working)? {
-            Some(extremes) => self.with(self.uncertainties.held(&extremes.least)).alone(working),
-            None => self.alone(working),
-        }
-    }
-
-    /// The same with the quantities between bounds where they are.
-    fn alone(&self, working: Working) -> Result<f64, Failure> {
-        let real = |factors: &[f64]| self.tried(factors, working);
-        Ok(bounded(self.around(&real)?.found()?.of[ALL].probability))
+        Ok(FixtureConformance { limits, joint, contributions, depth_at_wanted_mm, method })
     }
 
     /// Deepest cut up to `most_mm` with which all limits are kept with a probability; `None` where not even a thousandth of it is.
@@ -217,6 +130,43 @@ impl<'a> Judged<'a> {
         most_mm: f64,
     ) -> Result<Option<f64>, Failure> {
         deepest_mm(working.depth_mm, most_mm, wanted, &mut |depth_mm| self.probability(Working { depth_mm, ..working }))
+    }
+}
+
+impl Judging<LIMITS, { LIMITS + 1 }> for Judged<'_> {
+    type Of = FixtureQuantity;
+    type At = Working;
+
+    const NAMES: [(&'static str, &'static str); LIMITS] = NAMES;
+    const MOST_LINES: [usize; 2] = [16; 2];
+    const MOST_LINES_TRIED: [usize; 2] = Self::MOST_LINES;
+
+    fn uncertainties(&self) -> &Uncertainties<FixtureQuantity> {
+        &self.uncertainties
+    }
+
+    fn with(&self, uncertainties: Uncertainties<FixtureQuantity>) -> Self {
+        Self { uncertainties, ..self.clone() }
+    }
+
+    fn real(&self, working: Working) -> Result<impl Fn(&[f64]) -> Result<Margins<LIMITS>, Failure>, Failure> {
+        Ok(move |factors: &[f64]| self.margins(&drawn(self.job, self.case, &self.uncertainties, factors)?, working))
+    }
+
+    fn asked<'b>(
+        &'b self,
+        real: &'b Real<'b, LIMITS>,
+        most_lines: [usize; 2],
+    ) -> Asked<'b, FixtureQuantity, LIMITS, { LIMITS + 1 }> {
+        Asked {
+            uncertainties: &self.uncertainties,
+            limits: &self.limits,
+            sets: SETS,
+            seed: self.job.uncertainty.seed,
+            most_lines,
+            monitor: self.monitor,
+            real,
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Message, checkpoint};
 use crate::certainty::Uncertainties;
+use crate::certainty::judging::Judging;
 use crate::certainty::lines::points;
 
 use crate::fixture_stability::answer::conformance::Judged;

@@ -4,13 +4,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Finding, Message};
-use crate::certainty::around::{Around, Asked, Real, far};
-use crate::certainty::bounds::Extremes;
+use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
+use crate::certainty::judging::{Judging, Told};
 use crate::certainty::lines::{Margins, Together};
-use crate::certainty::{
-    ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, bounded, improbable, probably,
-};
+use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 use crate::clamping::Load;
 use crate::fixture_stability::quiet_to;
 
@@ -47,10 +45,6 @@ const SETS: [Together; LIMITS + 1] = [
     HELD..=HELD,
     STABLE..=HELD,
 ];
-const ALL: usize = LIMITS;
-/// Most lines of one scrambling: of the response surface, and of cuts; fewer of a depth that is tried on the way to the wanted one.
-const MOST_LINES: [usize; 2] = [128, 32];
-const MOST_LINES_TRIED: [usize; 2] = [64, 4];
 /// Lines of one scrambling on which cuts are compared.
 const COMPARED_LINES: usize = 4;
 /// Draws of the real model that an answer takes, roughly: lines of the answer itself, of a depth that is tried, and of a quantity of
@@ -95,18 +89,11 @@ struct Judged<'a> {
 pub(super) fn conformance(study: &Study<'_>) -> Result<Option<MillingConformance>, Failure> {
     let Some(judged) = Judged::new(study)? else { return Ok(None) };
     let depth_mm = study.case.depth_mm;
-    let extremes = judged.extremes(depth_mm)?;
-    let mut told = match &extremes {
-        Some(extremes) => judged.with(judged.of.held(&extremes.least)).told()?,
-        None => judged.told()?,
-    };
-    if let Some(Extremes { most, search, .. }) = &extremes {
-        let most = judged.with(judged.of.held(most)).alone(depth_mm, MOST_LINES)?;
-        told.joint = told.joint.least(most, *search);
-    }
+    let wanted = study.job.uncertainty.wanted_probability;
+    let Told { limits, joint, contributions, method } = judged.told(depth_mm, wanted, Some(COMPARED_LINES))?;
     let mut probability = |depth_mm: f64| judged.probability(depth_mm);
-    told.depth_at_wanted_mm = deepest_mm(depth_mm, study.examined_mm, told.joint.wanted, &mut probability)?;
-    Ok(Some(told))
+    let depth_at_wanted_mm = deepest_mm(depth_mm, study.examined_mm, wanted, &mut probability)?;
+    Ok(Some(MillingConformance { limits, joint, contributions, depth_at_wanted_mm, method }))
 }
 
 /// Draws of the real model that a job takes with so many quantities that have a distribution, so many of which bounds alone are known,
@@ -149,78 +136,6 @@ impl<'a> Judged<'a> {
         Ok((!is_known).then_some(Self { study, of, limits, held }))
     }
 
-    fn around<'b>(
-        &'b self,
-        real: &'b Real<'b, LIMITS>,
-        most_lines: [usize; 2],
-    ) -> Result<Around<'b, OneQuantity, LIMITS, { LIMITS + 1 }>, Failure> {
-        Around::of(Asked {
-            uncertainties: &self.of,
-            limits: &self.limits,
-            sets: SETS,
-            seed: self.study.job.uncertainty.seed,
-            most_lines,
-            monitor: self.study.monitor,
-            real,
-        })
-    }
-
-    /// The same with the quantities between bounds where they are held there.
-    fn with(&self, of: Uncertainties<OneQuantity>) -> Self {
-        Self { of, ..self.clone() }
-    }
-
-    /// Where within bounds the probability is least and most; `None` where there are none.
-    fn extremes(&self, depth_mm: f64) -> Result<Option<Extremes>, Failure> {
-        self.of.extremes(&mut |of| self.with(of.clone()).nearly(depth_mm))
-    }
-
-    /// The probability that all limits are kept at a depth, by a response surface alone.
-    fn nearly(&self, depth_mm: f64) -> Result<f64, Failure> {
-        let there = self.at(depth_mm)?;
-        let real = |factors: &[f64]| there.margins(factors);
-        self.around(&real, MOST_LINES_TRIED)?.nearly()
-    }
-
-    /// The same by the real model, with the quantities between bounds where they are.
-    fn alone(&self, depth_mm: f64, most_lines: [usize; 2]) -> Result<f64, Failure> {
-        let there = self.at(depth_mm)?;
-        let real = |factors: &[f64]| there.margins(factors);
-        Ok(bounded(self.around(&real, most_lines)?.found()?.of[ALL].probability))
-    }
-
-    /// That of a depth that is tried, within bounds the least.
-    fn probability(&self, depth_mm: f64) -> Result<f64, Failure> {
-        match self.extremes(depth_mm)? {
-            Some(extremes) => self.with(self.of.held(&extremes.least)).alone(depth_mm, MOST_LINES_TRIED),
-            None => self.alone(depth_mm, MOST_LINES_TRIED),
-        }
-    }
-
-    /// The block with the quantities between bounds where they are, but for the depth.
-    fn told(&self) -> Result<MillingConformance, Failure> {
-        let depth_mm = self.study.case.depth_mm;
-        let there = self.at(depth_mm)?;
-        let real = |factors: &[f64]| there.margins(factors);
-        let around = self.around(&real, MOST_LINES)?;
-        let found = around.found()?;
-        let joint = JointlyKept::of(found.of[ALL], self.study.job.uncertainty.wanted_probability);
-        let mut contributions = around.contributions(&found, Some(COMPARED_LINES))?;
-        contributions
-            .extend(self.of.contributions_within(joint.probability, &mut |of| self.with(of.clone()).nearly(depth_mm))?);
-        Ok(MillingConformance {
-            limits: self.limits.iter().map(|&limit| LimitKept::of(NAMES[limit], found.of[limit])).collect(),
-            joint,
-            contributions,
-            depth_at_wanted_mm: None,
-            method: ConformanceMethod {
-                integrated_lines: u32::try_from(found.lines).unwrap_or(u32::MAX),
-                linear_probability: bounded(around.linear_probability()?),
-                seed: self.study.job.uncertainty.seed,
-            },
-        })
-    }
-
     /// The cut at a depth, with the loads on the workpiece at the stated values: those of a rigid one go with the force.
     fn at(&self, depth_mm: f64) -> Result<There<'_>, Failure> {
         let cut = Cut { depth_mm, ..self.study.cut() };
@@ -229,6 +144,45 @@ impl<'a> Judged<'a> {
             _ => None,
         };
         Ok(There { of: self, depth_mm, loads })
+    }
+}
+
+impl Judging<LIMITS, { LIMITS + 1 }> for Judged<'_> {
+    type Of = OneQuantity;
+    /// The depth, mm.
+    type At = f64;
+
+    const NAMES: [(&'static str, &'static str); LIMITS] = NAMES;
+    const MOST_LINES: [usize; 2] = [128, 32];
+    const MOST_LINES_TRIED: [usize; 2] = [64, 4];
+
+    fn uncertainties(&self) -> &Uncertainties<OneQuantity> {
+        &self.of
+    }
+
+    fn with(&self, of: Uncertainties<OneQuantity>) -> Self {
+        Self { of, ..self.clone() }
+    }
+
+    fn real(&self, depth_mm: f64) -> Result<impl Fn(&[f64]) -> Result<Margins<LIMITS>, Failure>, Failure> {
+        let there = self.at(depth_mm)?;
+        Ok(move |factors: &[f64]| there.margins(factors))
+    }
+
+    fn asked<'b>(
+        &'b self,
+        real: &'b Real<'b, LIMITS>,
+        most_lines: [usize; 2],
+    ) -> Asked<'b, OneQuantity, LIMITS, { LIMITS + 1 }> {
+        Asked {
+            uncertainties: &self.of,
+            limits: &self.limits,
+            sets: SETS,
+            seed: self.study.job.uncertainty.seed,
+            most_lines,
+            monitor: self.study.monitor,
+            real,
+        }
     }
 }
 
@@ -243,7 +197,7 @@ impl There<'_> {
     /// By how much the limits are kept, as logarithms.
     fn margins(&self, factors: &[f64]) -> Result<Margins<LIMITS>, Failure> {
         let Judged { study, limits, .. } = self.of;
-        let drawn = drawn(&study.case, &self.of.of, factors);
+        let drawn = drawn(study.job, &study.case, &self.of.of, factors)?;
         let cut = Cut {
             milling: &drawn.milling,
             structure: &drawn.structure,
@@ -302,7 +256,7 @@ impl There<'_> {
         let Some((held, force_n)) = &self.of.held else { return Ok(f64::INFINITY) };
         let scaled = |load: &Load| Load { force_n: load.force_n.map(|part| part * drawn.force), ..*load };
         let loads = match &self.loads {
-            Some(loads) if !drawn.has_other_teeth => loads.iter().map(scaled).collect(),
+            Some(loads) if drawn.has_scaled_loads => loads.iter().map(scaled).collect(),
             _ => self.of.study.loads_of(held, cut)?,
         };
         let Ok(loaded) = held.rest.loaded(&held.fixture, &loads, 1.0) else { return Ok(f64::NEG_INFINITY) };

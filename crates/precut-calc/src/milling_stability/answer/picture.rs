@@ -38,6 +38,7 @@ pub(in crate::milling_stability) const DOUBT_LABELS: &[&str] = &[
     "doubt_runout",
     "doubt_clamp_force",
     "doubt_friction",
+    crate::certainty::picture::MODEL_LABEL,
 ];
 
 /// Codes that the figures utter.

@@ -1,12 +1,16 @@
 //! What is uncertain in a cut: its quantities, and what a draw of them changes (`certainty/1.4`).
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::calculator::Violations;
+use crate::calculator::{Failure, Violations};
 use crate::certainty::{
-    Block, Contradiction, Distribution, Level, Quantity, Source, Uncertain, Uncertainties, WidthUnit, uncertainty_block,
+    Block, Contradiction, Distribution, Level, OpenEffects, Quantity, Source, Uncertain, Uncertainties, WidthUnit,
+    check_brought, open, uncertainty_block,
 };
+use crate::effects::{JointUncertainty, MillingEffect, ParameterMove};
 use crate::fixture_stability::usual_scatter::{CUTTING_FORCE, DAMPING, FRICTION, SET_BY_HAND, SET_BY_PRESSURE};
 
 use super::super::model::{Milling, Mode, Side, Structure};
@@ -60,7 +64,36 @@ enum Part {
     Damping,
 }
 
+impl Part {
+    const ALL: [Self; 3] = [Self::Frequency, Self::Stiffness, Self::Damping];
+
+    /// The effect that is the same quantity of a mode, as a diagnosis finds it.
+    fn effect(self) -> &'static str {
+        match self {
+            Self::Frequency => "mode_frequency",
+            Self::Stiffness => "mode_stiffness",
+            Self::Damping => "mode_damping",
+        }
+    }
+}
+
 impl MillingQuantity {
+    /// Whether what is not known of the effects of the job tells all of it: of a quantity of modes that of every one. One that is told of
+    /// some modes alone acts on the others.
+    fn is_brought(self, job: &Job, structure: &Structure) -> bool {
+        if let Some((side, part)) = self.of_modes() {
+            let is_of = |mode: &&Mode| side.is_none_or(|side| mode.side == side);
+            let modes = structure.modes.iter().enumerate().filter(|(_, mode)| is_of(mode));
+            let mut told = modes.map(|(mode, _)| is_brought(job, part.effect(), Some(mode))).peekable();
+            return told.peek().is_some() && told.all(|told| told);
+        }
+        match self {
+            Self::CuttingForce => is_brought(job, "force_coefficient", None),
+            Self::Runout => is_brought(job, "tooth_runout", None),
+            _ => false,
+        }
+    }
+
     /// Of which side, `None` of both, and what of its modes; `None` of what is not of modes.
     fn of_modes(self) -> Option<(Option<Side>, Part)> {
         Some(match self {
@@ -139,6 +172,7 @@ uncertainty_block! {
     MillingUncertainty {
         quantities: MillingUncertainQuantity of MillingQuantity (max_items = 13), such as "mode_damping";
         correlations: MillingCorrelation (78), such as ["mode_stiffness", "mode_damping"];
+        effects: Vec<JointUncertainty>;
         /// Whether what is usual is uncertain, too, where nothing is said of it: frequency, stiffness and damping of all modes,
         /// cutting force, run-out, clamp force, friction.
         defaults;
@@ -198,7 +232,7 @@ pub(in crate::milling_stability) fn uncertainties(
     for (mode, of) in structure.modes.iter().enumerate() {
         let before = structure.modes[..mode].iter().filter(|other| other.side == of.side).count();
         let measured = fits.iter().find(|fit| fit.side == of.side);
-        for part in [Part::Frequency, Part::Stiffness, Part::Damping] {
+        for part in Part::ALL.into_iter().filter(|part| !is_brought(job, part.effect(), Some(mode))) {
             all.extend(of_mode(block, of.side, part, measured.and_then(|fit| scatter(fit, before, part))).map(|one| {
                 let quantity = OneQuantity { quantity: one.quantity, mode: Some(mode) };
                 Uncertain { quantity, distribution: one.distribution, level: one.level, source: one.source }
@@ -208,7 +242,8 @@ pub(in crate::milling_stability) fn uncertainties(
     for quantity in
         [MillingQuantity::CuttingForce, MillingQuantity::Runout, MillingQuantity::ClampForce, MillingQuantity::Friction]
     {
-        let usual = quantity.missing_in(job).is_none().then(|| usual(quantity, job));
+        let is_usual = quantity.missing_in(job).is_none() && !quantity.is_brought(job, structure);
+        let usual = is_usual.then(|| usual(quantity, job));
         all.extend(block.uncertain(quantity, Level::Setup, usual).map(|one| Uncertain {
             quantity: OneQuantity { quantity, mode: None },
             distribution: one.distribution,
@@ -217,7 +252,18 @@ pub(in crate::milling_stability) fn uncertainties(
         }));
     }
     let pairs = pairs(block, &all);
-    Uncertainties::new(all, pairs.iter().map(|(between, coefficient)| (&between[..], *coefficient)))
+    let all = Uncertainties::new(all, pairs.iter().map(|(between, coefficient)| (&between[..], *coefficient)))?;
+    Ok(all.beside(OpenEffects::of(&job.effects, &block.effects)))
+}
+
+/// Whether what is not known of the effects of a job is of this kind, and of this mode where one is meant.
+fn is_brought(job: &Job, kind: &str, mode: Option<usize>) -> bool {
+    let of = |unsure: &ParameterMove| unsure.place().and_then(|place| job.effects.get(place));
+    let is_of_mode = |effect: &MillingEffect| {
+        mode.is_none_or(|mode| effect.mode().and_then(|own| usize::try_from(own).ok()) == Some(mode + 1))
+    };
+    let moves = job.uncertainty.effects.iter().flat_map(|entry| &entry.moves).filter(|unsure| unsure.by.abs() > 0.0);
+    moves.filter_map(of).any(|effect| effect.kind() == kind && is_of_mode(effect))
 }
 
 /// That of a mode: as stated of its side, as stated of both, as measured, or as is usual.
@@ -297,14 +343,28 @@ pub(in crate::milling_stability) struct Drawn {
     pub force: f64,
     pub clamp: f64,
     pub friction: f64,
-    /// Whether teeth stand out otherwise.
-    pub has_other_teeth: bool,
+    /// Whether loads on a rigid workpiece are those at the stated values times the factor on the force.
+    pub has_scaled_loads: bool,
 }
 
-/// The cut where the quantities come to this.
-pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQuantity>, factors: &[f64]) -> Drawn {
+/// The cut where the quantities come to this; `case` is that of the job.
+pub(in crate::milling_stability) fn drawn(
+    job: &Job,
+    case: &Case,
+    of: &Uncertainties<OneQuantity>,
+    factors: &[f64],
+) -> Result<Drawn, Failure> {
+    let effects = of.effects.effects(&job.effects, of.of_effects(factors))?;
+    let has_scaled_loads = effects.is_none();
+    let case = match effects {
+        Some(effects) => {
+            let moved = Case::of(&Job { effects, ..job.clone() });
+            Cow::Owned(moved.ok_or_else(|| Failure::Internal("a job that the check refuses".to_owned()))?)
+        }
+        None => Cow::Borrowed(case),
+    };
     let (milling, structure) = (case.milling.clone(), case.structure.clone());
-    let mut draw = Drawn { milling, structure, force: 1.0, clamp: 1.0, friction: 1.0, has_other_teeth: false };
+    let mut draw = Drawn { milling, structure, force: 1.0, clamp: 1.0, friction: 1.0, has_scaled_loads };
     for (OneQuantity { quantity, mode }, factor) in of.drawn(factors) {
         if let (Some((_, part)), Some(mode)) = (quantity.of_modes(), mode) {
             put(part, factor, &mut draw.structure.modes[mode]);
@@ -312,7 +372,7 @@ pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQua
         }
         match quantity {
             MillingQuantity::Runout => {
-                draw.has_other_teeth = true;
+                draw.has_scaled_loads = false;
                 for tooth in &mut draw.milling.teeth {
                     tooth.radial_mm *= factor;
                     tooth.axial_mm *= factor;
@@ -326,7 +386,7 @@ pub(in crate::milling_stability) fn drawn(case: &Case, of: &Uncertainties<OneQua
             }
         }
     }
-    draw
+    Ok(draw)
 }
 
 fn put(part: Part, factor: f64, mode: &mut Mode) {
@@ -337,11 +397,17 @@ fn put(part: Part, factor: f64, mode: &mut Mode) {
     }
 }
 
-/// Finds what cannot be. Modes of a measured side are known only when it was fitted: until then one stands for them.
+/// Finds what cannot be. Modes of a measured side are known only when it was fitted: until then some stand for them, and whether effects
+/// tell of all of them is not known.
 pub(super) fn check(job: &Job, violations: &mut Violations) {
-    let contradiction = || {
-        let guessed = super::measured::guessed(job)?;
-        uncertainties(job, &Case::of(&guessed)?.structure, &[]).err()
-    };
-    job.uncertainty.check(contradiction, |quantity| quantity.missing_in(job), violations);
+    let structure = super::measured::guessed(job).and_then(|guessed| Some(Case::of(&guessed)?.structure));
+    let block = &job.uncertainty;
+    let contradiction = || uncertainties(job, structure.as_ref()?, &[]).err();
+    block.check(contradiction, |quantity| quantity.missing_in(job), violations);
+    open::check(&job.effects, &block.effects, violations);
+    let is_measured = job.sides().iter().any(|(.., yielding)| matches!(yielding, Yielding::Receptances(_)));
+    if let Some(structure) = structure.as_ref().filter(|_| !is_measured) {
+        let stated = block.quantities.iter().map(|one| one.quantity);
+        check_brought(stated, |one| one.is_brought(job, structure), violations);
+    }
 }

@@ -8,7 +8,7 @@ use crate::calculator::{
     Hypotheses, Hypothesis, JacobianColumn, Monitor, NextRuns, Outlook, Prediction, PrepareError, Quantity, Ranges,
     Rows,
 };
-use crate::effects::{Cause, MILLING_CAUSES, MillingEffect};
+use crate::effects::{Cause, JointUncertainty, MILLING_CAUSES, MillingEffect};
 
 use super::super::MillingStability;
 use super::super::job::Job;
@@ -121,6 +121,7 @@ impl ForwardModel for MillingStability {
     type Prepared = PreparedMilling;
 
     const CAUSES: &'static [Cause] = MILLING_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] = &["spindle_speed_rpm", "depth_mm", "width_mm"];
 
@@ -139,8 +140,14 @@ impl ForwardModel for MillingStability {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        let mut job = Job { effects: Vec::new(), ..job.clone() };
+        job.uncertainty.effects.clear();
+        job
     }
 
     fn prepare(
