@@ -58,6 +58,14 @@ impl JobId {
         bytes[8] = 0x80 | (bytes[8] & 0x3f);
         Self(Uuid::from_bytes(bytes))
     }
+
+    /// Of a shard the name by which there is news of all shards of its parent.
+    pub(crate) fn of_siblings(self) -> Option<Self> {
+        let mut bytes = self.0.into_bytes();
+        let is_shard = bytes[0] == 0 && bytes[6] >> 4 == 8;
+        bytes[12..].fill(0xff);
+        is_shard.then_some(Self(Uuid::from_bytes(bytes)))
+    }
 }
 
 impl Default for JobId {

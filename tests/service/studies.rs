@@ -200,6 +200,20 @@ async fn with_one_place_studies_end_and_none_holds_it_while_its_shards_are_compu
 }
 
 #[tokio::test]
+async fn a_study_of_more_shards_than_are_in_line_at_a_time_has_all_its_rows() {
+    let server = Server::start().await;
+    let mut study = long(300, 0);
+    // Each of them a shard of its own, by its estimate.
+    study["job"]["work_ms"] = json!(500);
+    let response = server.post_to(STUDIES, study.to_string()).header("prefer", "wait=60").send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    assert_eq!(response.json::<Value>().await.unwrap()["result"]["succeeded"], 300);
+    let metrics = server.get("/metrics").send().await.unwrap().text().await.unwrap();
+    let computed = metrics.lines().find_map(|line| line.strip_prefix("precut_jobs_shards_total ")).unwrap();
+    assert!(computed.parse::<f64>().unwrap() >= 300.0, "{computed}");
+}
+
+#[tokio::test]
 async fn a_study_gives_the_same_bytes_on_one_core_and_on_many() {
     let mut bodies = Vec::new();
     for slots in [1, 4] {

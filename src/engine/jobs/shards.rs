@@ -29,10 +29,10 @@ use crate::store::jobs::{Ending, Shard, ShardId};
 
 /// So many shards of a job are in line or computed at a time; more than there are places.
 const WINDOW: usize = 256;
-/// How often there is a look at shards that are over, where nobody tells of the first of them.
-const COLLECT: Duration = Duration::from_millis(500);
-/// How often it is seen to that one of them has the job's turn.
+/// How often there is a look at shards that are over where nobody tells of any, and whether one has the job's turn.
 const LOOK: Duration = Duration::from_secs(1);
+/// So long after a look there is no other, however many shards end.
+const REST: Duration = Duration::from_millis(100);
 /// After so many shards that came to nothing readable it is not the disk that is to blame.
 const MOST_DAMAGED: u32 = 100;
 /// Plans that are kept.
@@ -115,6 +115,8 @@ impl<'e> Gathering<'e> {
 
     async fn run(mut self, running: &Running, slot: Slot) -> Result<(), Error> {
         let mut slot = Some(slot);
+        // Before the first look: news that come in between are not lost.
+        let mut feed = self.engine.jobs.feed(ShardId { parent: self.key, number: u32::MAX }.job());
         self.collect().await?;
         self.open.clear();
         self.sharded.tell(&**self.progress);
@@ -122,17 +124,15 @@ impl<'e> Gathering<'e> {
             self.fill(running).await?;
             drop(slot.take());
             running.take_place(None);
-            let Some(&first) = self.open.first() else { continue };
-            // Before the look: news that come in between are not lost.
-            let mut feed = self.engine.jobs.feed(ShardId { parent: self.key, number: first }.job());
-            self.collect().await?;
-            if self.open.contains(&first) {
-                tokio::select! {
-                    () = feed.changed() => {}
-                    () = tokio::time::sleep(COLLECT) => {}
-                    () = running.cancelled() => return Err(Error::Cancelled),
-                }
+            let news = async {
+                tokio::time::sleep(REST).await;
+                let _ = tokio::time::timeout(LOOK, feed.changed()).await;
+            };
+            tokio::select! {
+                () = news => {}
+                () = running.cancelled() => return Err(Error::Cancelled),
             }
+            self.collect().await?;
         }
         Ok(())
     }

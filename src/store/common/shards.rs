@@ -87,12 +87,12 @@ pub(in crate::store) async fn over<S: Session>(
     parent: Key,
     numbers: &[u32],
 ) -> Outcome<Vec<Shard>> {
-    if numbers.is_empty() {
-        return Ok(Vec::new());
-    }
+    let Some(last) = numbers.last() else { return Ok(Vec::new()) };
+    // Few lengths of the list: each is another statement, which has to be prepared.
+    let asked = numbers.iter().chain(std::iter::repeat(last)).take(numbers.len().next_power_of_two());
     let mut over = sql("SELECT shard, content, problem FROM jobs WHERE state IN ('succeeded', 'failed') AND parent = ");
     over.push_bind(parent).push(" AND id IN ");
-    over.push_list(numbers.iter().map(|&number| ShardId { parent, number }.job()));
+    over.push_list(asked.map(|&number| ShardId { parent, number }.job()));
     let rows: Vec<(i32, Option<Vec<u8>>, Option<String>)> = connection.all(over).await?;
     let shard = |(number, content, problem): (i32, Option<Vec<u8>>, Option<String>)| Shard {
         number: count(number),
@@ -109,7 +109,9 @@ pub(in crate::store) async fn input_of<S: Session>(connection: &mut S, key: Key)
 
 /// Forgets shards whose parent is over.
 pub(in crate::store) async fn forget_orphans<S: Session>(connection: &mut S) -> Outcome<()> {
-    let orphans = sql("DELETE FROM jobs WHERE parent IS NOT NULL AND NOT EXISTS (
-             SELECT 1 FROM jobs AS whole WHERE whole.key = jobs.parent AND whole.state IN ('queued', 'running'))");
+    let orphans = sql("DELETE FROM jobs WHERE parent IN (
+             SELECT parent FROM (SELECT DISTINCT parent FROM jobs WHERE parent IS NOT NULL) AS parents
+             WHERE NOT EXISTS (SELECT 1 FROM jobs AS whole
+                               WHERE whole.key = parents.parent AND whole.state IN ('queued', 'running')))");
     connection.run(orphans).await.map(drop)
 }

@@ -230,6 +230,11 @@ impl Place for InDatabase {
         self.execute("UPDATE precut.jobs SET content = substring(content FROM 1 FOR octet_length(content) - 1)").await;
     }
 
+    async fn abandon(&self, key: Key) {
+        let gone = sqlx::query("DELETE FROM precut.jobs WHERE key = $1").bind(key.as_bytes().as_slice());
+        gone.execute(&self.runtime_pool).await.unwrap();
+    }
+
     async fn shards(&self) -> i64 {
         let shards = sqlx::query_scalar("SELECT count(*) FROM precut.jobs WHERE parent IS NOT NULL");
         shards.fetch_one(&self.runtime_pool).await.unwrap()

@@ -76,6 +76,11 @@ impl Place for InFile {
         }
     }
 
+    async fn abandon(&self, key: Key) {
+        let gone = sqlx::query("DELETE FROM jobs WHERE key = ?1").bind(key.as_bytes().as_slice());
+        gone.execute(&self.pool().await).await.unwrap();
+    }
+
     async fn shards(&self) -> i64 {
         let shards = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE parent IS NOT NULL");
         shards.fetch_one(&self.pool().await).await.unwrap()

@@ -35,6 +35,8 @@ pub(in crate::store) trait Place: Sized {
     async fn later(&self, ms: i64);
     /// Changes the rows of kept results, and of shards that are done.
     async fn damage(&self);
+    /// Takes the jobs of a key away, and leaves their shards.
+    async fn abandon(&self, key: Key);
     /// The shards that are on record.
     async fn shards(&self) -> i64;
 

@@ -171,7 +171,17 @@ pub(in crate::store) async fn shards_stay_as_long_as_an_equal_job_wants_them<P: 
     place.store().cancel(parent.jobs[0]).await.unwrap().unwrap();
     assert_eq!(place.shards().await, 2);
     assert_eq!(next(&place).await.shard, Some(shard(1, 0)));
+    place.store().forget_expired().await.unwrap();
+    assert_eq!(place.shards().await, 2);
     place.store().cancel(joined.id).await.unwrap().unwrap();
+    assert_eq!(place.shards().await, 0);
+    // Who wrote one just then has left it: it is taken by nobody, and forgotten.
+    let again = place.accept(job(1)).await.id;
+    let again = place.run(again).await;
+    add(&place, again.lease, &[0, 1]).await;
+    place.abandon(key(1)).await;
+    assert_eq!((place.shards().await, place.store().waits(None).await.unwrap()), (2, false));
+    place.store().forget_expired().await.unwrap();
     assert_eq!(place.shards().await, 0);
 }
 
