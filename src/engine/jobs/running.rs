@@ -103,6 +103,11 @@ impl Running {
         *self.place.lock().unwrap_or_else(PoisonError::into_inner) = place;
     }
 
+    /// It runs on without a place: others do what there is to be done.
+    pub(super) fn give_place_back(&self) {
+        self.take_place(None);
+    }
+
     /// Jobs are served by it.
     pub(super) fn claimed(&self) {
         self.claimed.store(true, Ordering::Release);

@@ -123,7 +123,7 @@ impl<'e> Gathering<'e> {
         while !self.missing.is_empty() {
             self.fill(running).await?;
             drop(slot.take());
-            running.take_place(None);
+            running.give_place_back();
             let news = async {
                 tokio::time::sleep(REST).await;
                 let _ = tokio::time::timeout(LOOK, feed.changed()).await;
