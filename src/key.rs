@@ -37,6 +37,13 @@ impl Key {
         Self(*hasher.finalize().as_bytes())
     }
 
+    /// The key of a shard as a job: `BLAKE3("precut-shard-1\n" key number)`, the number as four bytes, the highest first.
+    pub(crate) fn of_shard(parent: &Self, number: u32) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"precut-shard-1\n").update(&parent.0).update(&number.to_be_bytes());
+        Self(*hasher.finalize().as_bytes())
+    }
+
     /// A key from its 32 bytes.
     pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Self> {
         bytes.try_into().ok().map(Self)

@@ -29,7 +29,7 @@ pub use entry::{Entry, Prepared, ResultNotes, Schemas, UnreadableResult};
 
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Checker, Faults, by_pointer, child};
-pub(crate) use entry::{Calculation, Job, ModelUse, Unprepared, second_line};
+pub(crate) use entry::{Calculation, Job, ModelUse, Sharded, Unfinished, Unprepared, second_line};
 pub(crate) use fault::{cut_short_at, intern as interned};
 pub(crate) use finite::non_finite_place;
 pub(crate) use names::takes as takes_names;

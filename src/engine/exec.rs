@@ -44,12 +44,18 @@ pub(crate) struct Slot {
     /// Of who runs alone: short jobs keep away, too.
     #[allow(dead_code)]
     keeps_away: Option<OwnedSemaphorePermit>,
+    is_short: bool,
 }
 
 impl Slot {
     /// Where its calculation is to stand in line.
     pub(crate) fn line(&self) -> Arc<Line> {
         Arc::clone(&self.line)
+    }
+
+    /// Whether it is the one for short jobs.
+    pub(crate) const fn is_short(&self) -> bool {
+        self.is_short
     }
 
     /// Runs `work` and waits for it.
@@ -104,7 +110,7 @@ impl Cores {
     }
 
     /// How many jobs may run at the same time.
-    pub(crate) fn job_places(&self) -> usize {
+    pub(crate) const fn job_places(&self) -> usize {
         self.job_slot_count as usize
     }
 
@@ -123,17 +129,14 @@ impl Cores {
     /// The right to run a short job while others have taken all places.
     pub(crate) async fn short_job_slot(&self) -> Result<Slot, Error> {
         let permit = Arc::clone(&self.short_slot).acquire_owned().await;
-        permit.map(|permit| self.short_pool.slot(permit)).map_err(|_closed| Error::ShuttingDown)
+        permit
+            .map(|permit| Slot { is_short: true, ..self.short_pool.slot(permit) })
+            .map_err(|_closed| Error::ShuttingDown)
     }
 
     /// Whether a job that comes now finds a place.
     pub(crate) fn has_job_place(&self) -> bool {
         self.job_slots.available_permits() > 0
-    }
-
-    /// The right to use one more core for a job, if nobody waits for it.
-    pub(crate) fn spare_job_slot(&self) -> Option<Slot> {
-        Arc::clone(&self.job_slots).try_acquire_owned().ok().map(|permit| self.job_pool.slot(permit))
     }
 
     /// Gives no more slots and waits until those given are back, at most so long; whether they are.
@@ -173,7 +176,7 @@ impl Pool {
     }
 
     fn slot(&self, permit: OwnedSemaphorePermit) -> Slot {
-        Slot { line: Arc::clone(&self.line), permit, keeps_away: None }
+        Slot { line: Arc::clone(&self.line), permit, keeps_away: None, is_short: false }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use precut_calc::calculator::{Figure, Message};
+use precut_calc::calculator::{Figure, Message, Monitor};
 
 /// Where a calculation leaves word of itself, and whoever waits looks.
 #[derive(Default)]
@@ -48,5 +48,17 @@ impl Progress {
     /// What was said last.
     pub(crate) fn read(&self) -> Reported {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Monitor for Progress {
+    fn cancelled(&self) -> bool {
+        false
+    }
+    fn progress(&self, fraction: f64, stage: Message) {
+        self.report(fraction, stage);
+    }
+    fn interim(&self, figure: Figure) {
+        self.show(figure);
     }
 }

@@ -304,8 +304,8 @@ fn recorder() -> &'static PrometheusHandle {
         metrics::describe_gauge!("precut_owner_kept_bytes", "Jobs, their results and models that are kept, by owner of keys.");
         metrics::describe_gauge!("precut_jobs", "Jobs by state: queued, running.");
         metrics::describe_counter!(
-            "precut_jobs_helped_total",
-            "Times that this process computed parts of a job that another one runs."
+            "precut_jobs_shards_total",
+            "Shards of large studies that this process began to compute."
         );
         metrics::describe_counter!(
             "precut_callbacks_total",

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -566,9 +567,9 @@ impl Prepared {
     pub fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
         self.job.run(monitor, body)
     }
-    /// Computes parts of the job that somebody else runs, as long as `go_on` says so; whether some may be left.
-    pub(crate) fn help(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool) -> bool {
-        self.job.help(monitor, go_on)
+    /// Its shards, if it is worth to compute them apart.
+    pub(crate) fn sharded(&self) -> Option<Arc<dyn Sharded>> {
+        self.job.sharded()
     }
 }
 
@@ -632,10 +633,33 @@ pub(crate) trait Job: Send + Sync {
     fn input(&self) -> Result<Value, Failure>;
     fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
     fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure>;
-    /// Computes parts of the job that somebody else runs, as long as `go_on` says so; whether some may be left.
-    fn help(&self, _monitor: &dyn Monitor, _go_on: &mut dyn FnMut() -> bool) -> bool {
-        false
+    /// Its shards, if it is worth to compute them apart: what is taken up of them, `run` does not compute.
+    fn sharded(&self) -> Option<Arc<dyn Sharded>> {
+        None
     }
+}
+
+/// A job in shards: each can be computed by itself, by whoever has a place, and comes to the same.
+pub(crate) trait Sharded: Send + Sync {
+    /// How many there are.
+    fn count(&self) -> usize;
+    /// What a shard comes to; `apart`: what may end its process is computed in one of its own.
+    fn compute(&self, index: usize, monitor: &dyn Monitor, apart: bool) -> Result<Vec<u8>, Unfinished>;
+    /// Takes up what a shard came to; whether it is that.
+    fn take_up(&self, index: usize, content: &[u8]) -> bool;
+    /// Tells how far it is by what was taken up.
+    fn tell(&self, monitor: &dyn Monitor);
+}
+
+/// Why a shard came to nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Unfinished {
+    /// Nobody wants it any more.
+    Cancelled,
+    /// It ended the process that it was tried in.
+    Deadly,
+    /// Our own fault.
+    Failed(Failure),
 }
 
 /// The types of a calculator.

@@ -47,6 +47,27 @@ impl JobId {
     }
 }
 
+impl JobId {
+    /// The name of a shard: in the order of its number, and before all other jobs of whatever time.
+    fn of_shard(shard: &ShardId) -> Self {
+        let mut bytes = [0; 16];
+        bytes[1..12].copy_from_slice(&shard.parent.as_bytes()[..11]);
+        bytes[12..].copy_from_slice(&shard.number.to_be_bytes());
+        // Version 8, of the variant of all others.
+        bytes[6] = 0x80 | (bytes[6] & 0x0f);
+        bytes[8] = 0x80 | (bytes[8] & 0x3f);
+        Self(Uuid::from_bytes(bytes))
+    }
+
+    /// Of a shard the name by which there is news of all shards of its parent.
+    pub(crate) fn of_siblings(self) -> Option<Self> {
+        let mut bytes = self.0.into_bytes();
+        let is_shard = bytes[0] == 0 && bytes[6] >> 4 == 8;
+        bytes[12..].fill(0xff);
+        is_shard.then_some(Self(Uuid::from_bytes(bytes)))
+    }
+}
+
 impl Default for JobId {
     fn default() -> Self {
         Self::new()
@@ -174,6 +195,36 @@ pub(crate) fn yields_to(estimate_ms: f64) -> i64 {
     doublings
 }
 
+/// Which shard of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShardId {
+    /// The key of the job.
+    pub parent: Key,
+    /// The number of the shard, from 0.
+    pub number: u32,
+}
+
+impl ShardId {
+    /// The name that it has as a job.
+    pub(crate) fn job(&self) -> JobId {
+        JobId::of_shard(self)
+    }
+
+    /// The key that it has as a job.
+    pub(crate) fn key(&self) -> Key {
+        Key::of_shard(&self.parent, self.number)
+    }
+}
+
+/// A shard that is over.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shard {
+    /// Its number.
+    pub number: u32,
+    /// What it came to (nothing where that is damaged), or why it failed, as JSON.
+    pub outcome: Result<Bytes, String>,
+}
+
 /// A job to be accepted.
 #[derive(Debug, Clone)]
 pub struct NewJob {
@@ -293,6 +344,10 @@ pub struct Claim {
     pub lease: Lease,
     /// All jobs that it serves.
     pub jobs: Vec<JobId>,
+    /// Their key.
+    pub key: Key,
+    /// Which shard it is, if it is one: then there is no input but that of its parent.
+    pub shard: Option<ShardId>,
     /// What it computes.
     pub kind: JobKind,
     /// By which calculator.
@@ -326,7 +381,7 @@ pub struct Wanted {
 #[derive(Debug, Clone)]
 pub enum Next {
     /// Run this.
-    Run(Claim),
+    Run(Box<Claim>),
     /// This is to be claimed as the only one that runs: it may be to blame for the end of its processes. Nobody else is
     /// told of it while it is held.
     Suspect {
@@ -334,9 +389,9 @@ pub enum Next {
         id: JobId,
         /// By which calculator.
         calculator: String,
+        /// Whether it is a shard.
+        is_shard: bool,
     },
-    /// Compute parts of this.
-    Help(Shared),
     /// Nothing.
     Nothing,
 }
@@ -345,7 +400,7 @@ pub enum Next {
 #[derive(Debug, Clone)]
 pub enum Claimed {
     /// Run this.
-    Run(Claim),
+    Run(Box<Claim>),
     /// It has taken its last process with it: these jobs failed.
     Poisonous(Vec<JobId>),
     /// Nothing waits there.
@@ -357,6 +412,8 @@ pub enum Claimed {
 pub enum Ending {
     /// With a result.
     Succeeded(KeptResult),
+    /// A shard, with what it came to.
+    Shard(Bytes),
     /// Without; why, as JSON.
     Failed(String),
 }
@@ -465,19 +522,6 @@ pub enum News {
 /// Who hears of news.
 pub type Hear = Arc<dyn Fn(News) + Send + Sync>;
 
-/// A job that is being computed and made of parts that others may compute, too.
-#[derive(Debug, Clone)]
-pub struct Shared {
-    /// Its name.
-    pub id: JobId,
-    /// Address of its result.
-    pub key: Key,
-    /// By which calculator.
-    pub calculator: String,
-    /// All that is needed.
-    pub input: Bytes,
-}
-
 /// Where jobs are kept and queued. What it has said yes to survives the process.
 pub trait JobStore: Send + Sync + 'static {
     /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
@@ -493,15 +537,24 @@ pub trait JobStore: Send + Sync + 'static {
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
     /// Whether there is something to do, for [`Wanted::short_ms`].
     fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
-    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start.
+    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start. A shard is taken
+    /// only while its parent runs.
     fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
     /// Keeps a suspect from others for `SILENCE`.
     fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
     /// `problem`, if they have been charged `most` already.
     fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
-    /// Ends a computation and all jobs that still want it; which these are.
+    /// Ends a computation and all jobs that still want it; which these are. A shard ends only once the results of its points
+    /// are written, and is forgotten with the end of its parent.
     fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
+    /// Puts shards of what runs under a lease in line, also such as are over; those that wait or run stay as they are. One
+    /// of them has the parent's turn, the others go behind all jobs of its priority. Whether the lease holds.
+    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Of these shards those that are over.
+    fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>>;
+    /// What is needed to run the job of a key that runs.
+    fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>>;
     /// Puts a computation back in line without a charge.
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// What an owner takes of the service.
@@ -545,8 +598,4 @@ pub trait JobStore: Send + Sync + 'static {
     }
     /// From now on tells what happens in other processes.
     fn tell(&self, _hear: Hear) {}
-    /// Asks so many others at most to compute parts of the job that is computed under this key.
-    fn call_for_help(&self, _key: Key, _most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async { Ok(()) })
-    }
 }

@@ -17,7 +17,6 @@ mod row;
 mod sql;
 pub mod sqlite;
 mod sqlite_jobs;
-mod sqlite_studies;
 #[cfg(test)]
 mod suite;
 mod writer;
@@ -116,45 +115,6 @@ pub trait ResultStore: Send + Sync + 'static {
     fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes what waits and closes.
     fn close(&self) -> BoxFuture<'_, ()>;
-    /// Puts a part of a study down. On return it outlasts the process, and so do the results of its points; where they
-    /// are not written in time, it fails, and may be tried again.
-    fn put_shard(&self, _study: Key, _shard: u32, _content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async { Ok(()) })
-    }
-    /// The parts of a study that are put down.
-    fn shards(&self, _study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
-        Box::pin(async { Ok(Vec::new()) })
-    }
-    /// Forgets the parts of a study.
-    fn forget_shards(&self, _study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async { Ok(()) })
-    }
-    /// Takes the next part of a study of so many parts for this process, where several share them; it keeps it until it
-    /// puts it down, gives it back, or dies.
-    fn take_shard(&self, _study: Key, _of: u32) -> BoxFuture<'_, Result<Taken, StoreError>> {
-        Box::pin(async { Ok(Taken::NotShared) })
-    }
-    /// Gives a part back that was taken and is not put down.
-    fn give_shard_back(&self, _study: Key, _shard: u32) {}
-    /// The parts of a study that are put down, of those asked for.
-    fn some_shards(&self, study: Key, wanted: Vec<u32>) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
-        Box::pin(async move {
-            let mut shards = self.shards(study).await?;
-            shards.retain(|(shard, _)| wanted.contains(shard));
-            Ok(shards)
-        })
-    }
-}
-
-/// What came of asking for a part of a study.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Taken {
-    /// This one is to be computed.
-    Shard(u32),
-    /// All are done or in the hands of somebody who lives.
-    NoneLeft,
-    /// Nobody else computes parts: whoever asks has them all.
-    NotShared,
 }
 
 /// A result as it is kept.

@@ -206,15 +206,6 @@ impl ResultStore for SqliteStore {
             Ok(())
         })
     }
-    fn put_shard(&self, study: Key, shard: u32, content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.put_down_shard(study, shard, content))
-    }
-    fn shards(&self, study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
-        Box::pin(self.shards_of(study))
-    }
-    fn forget_shards(&self, study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.forget_shards_of(study))
-    }
     fn close(&self) -> BoxFuture<'_, ()> {
         Box::pin(async {
             // What was ordered is written.

@@ -32,9 +32,9 @@ const REST_PER_WORK: u32 = 4;
 const REST: (Duration, Duration) = (Duration::from_millis(20), Duration::from_millis(250));
 /// How often age is looked at.
 const SWEEP_EVERY: Duration = Duration::from_mins(10);
-/// How long a list waits for what is just being written, and a part of a study for the results of its points.
+/// How long a list waits for what is just being written, and a shard of a study for the results of its points.
 pub(super) const LIST_PATIENCE: Duration = Duration::from_secs(1);
-pub(super) const PART_PATIENCE: Duration = Duration::from_secs(5);
+pub(super) const POINTS_PATIENCE: Duration = Duration::from_secs(5);
 /// Rows deleted in one transaction.
 const EVICTED_AT_ONCE: i64 = 256;
 /// Eviction goes down to this share of the limit, so that it does not run for every result.

@@ -17,6 +17,14 @@ fn study(points: u32, each_ms: u32) -> Value {
     })
 }
 
+const DONE: &str = "state = 'succeeded'";
+
+/// How many shards are on record of which that is true.
+async fn shards(pool: &sqlx::PgPool, what: &'static str) -> i64 {
+    let counted = format!("SELECT count(*) FROM precut.jobs WHERE parent IS NOT NULL AND {what}");
+    sqlx::query_scalar(sqlx::AssertSqlSafe(counted)).fetch_one(pool).await.unwrap()
+}
+
 /// Runs a study; its bytes and how long it took from its start to its end, by the service's own clock.
 async fn run(api: &Member, study: &Value) -> (Vec<u8>, f64) {
     let address = api.accepted(STUDIES, study).await;
@@ -36,20 +44,19 @@ async fn a_study_is_spread_over_the_workers_and_has_the_same_bytes_as_on_one_mac
     let (alone, alone_s) = run(&api, &study).await;
     // Its points are forgotten, so that they are computed again.
     let pool = database.pool().await;
+    assert_eq!(shards(&pool, "true").await, 0, "what is done leaves no shards behind");
     for statement in ["DELETE FROM precut.results", "DELETE FROM precut.jobs"] {
         sqlx::query(statement).execute(&pool).await.unwrap();
     }
-    let left: i64 = sqlx::query_scalar("SELECT count(*) FROM precut.studies").fetch_one(&pool).await.unwrap();
-    assert_eq!(left, 0, "what is done leaves no parts behind");
     api.stop();
     first.stop();
     let api = Member::start(&database, "api", &[]).await;
     let workers = [Member::start(&database, "worker", &slots).await, Member::start(&database, "worker", &slots).await];
     let (together, together_s) = run(&api, &study).await;
     assert_eq!(alone, together);
-    let helped: f64 =
-        workers[0].figure("precut_jobs_helped_total").await + workers[1].figure("precut_jobs_helped_total").await;
-    assert!(helped > 0.0, "the other worker has helped");
+    for worker in &workers {
+        assert!(worker.figure("precut_jobs_shards_total").await > 0.0, "each has a part in it");
+    }
 
     // And as with the embedded store.
     let data = tempfile::tempdir().unwrap();
@@ -74,7 +81,7 @@ async fn a_study_is_spread_over_the_workers_and_has_the_same_bytes_as_on_one_mac
 }
 
 #[tokio::test]
-async fn a_study_survives_whoever_runs_it_and_whoever_helps() {
+async fn a_study_survives_whoever_runs_it_and_whoever_computes_its_shards() {
     let Some(database) = Database::start() else { return };
     let slots = [("PRECUT_JOBS_SLOTS", "1")];
     let api = Member::start(&database, "api", &[]).await;
@@ -85,14 +92,8 @@ async fn a_study_survives_whoever_runs_it_and_whoever_helps() {
     let address = api.accepted(STUDIES, &study(150, 100)).await;
     api.job_in(&address, "running").await;
     let pool = database.pool().await;
-    let done = async || -> i64 {
-        sqlx::query_scalar("SELECT count(*) FROM precut.studies WHERE points IS NOT NULL")
-            .fetch_one(&pool)
-            .await
-            .unwrap()
-    };
-    until("some parts", async || (done().await >= 3).then_some(())).await;
-    // Two of three are killed: whoever runs it is among them, or else both who help.
+    until("some shards", async || (shards(&pool, DONE).await >= 3).then_some(())).await;
+    // Two of three are killed: whoever runs it is among them, or else both others.
     workers.remove(0).kill();
     workers.remove(0).kill();
     let begun = Instant::now();
@@ -105,36 +106,35 @@ async fn a_study_survives_whoever_runs_it_and_whoever_helps() {
     workers.push(Member::start(&database, "worker", &slots).await);
     let address = api.accepted(STUDIES, &study(400, 110)).await;
     api.job_in(&address, "running").await;
-    until("some parts", async || (done().await >= 2).then_some(())).await;
+    until("some shards", async || (shards(&pool, DONE).await >= 2).then_some(())).await;
     assert_eq!(api.client.delete(api.url(&address)).send().await.unwrap().status(), 202);
     let begun = Instant::now();
-    let mut last = (done().await, Instant::now());
-    // Parts that were just being put down may still arrive; then nothing more does.
-    while last.1.elapsed() < Duration::from_secs(2) {
-        tokio::time::sleep(Duration::from_millis(50)).await;
-        let now = done().await;
-        if now != last.0 {
-            last = (now, Instant::now());
+    // One that is just being written may stay for a minute, but nobody computes it.
+    assert_eq!(shards(&pool, "state = 'queued'").await, 0);
+    until("its end", async || (shards(&pool, "state = 'running'").await == 0).then_some(())).await;
+    let computed = async || {
+        let mut computed = 0.0;
+        for worker in &workers {
+            computed += worker.figure("precut_jobs_shards_total").await;
         }
-    }
-    println!("a study that was cancelled: no part of it is put down later than {:.1?}", last.1.duration_since(begun));
+        computed
+    };
+    let at_end = computed().await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(computed().await.to_bits(), at_end.to_bits(), "none of them is begun any more");
+    println!("a study that was cancelled: nobody computes a shard of it {:.1?} later", begun.elapsed());
 }
 
 #[tokio::test]
-async fn a_study_goes_on_after_the_database_was_away_for_longer_than_its_parts_wait() {
+async fn a_study_goes_on_after_the_database_was_away_for_longer_than_its_shards_wait() {
     let Some(mut database) = Database::start() else { return };
     let api = Member::start(&database, "api", &[]).await;
-    // One worker: nobody else takes what it could not put down.
+    // One worker: nobody else takes what it could not write.
     let worker = Member::start(&database, "worker", &[("PRECUT_JOBS_SLOTS", "1")]).await;
     let address = api.accepted(STUDIES, &study(60, 100)).await;
     api.job_in(&address, "running").await;
     let pool = database.pool().await;
-    until("some parts", async || {
-        let done = "SELECT count(*) FROM precut.studies WHERE points IS NOT NULL";
-        let done: i64 = sqlx::query_scalar(done).fetch_one(&pool).await.unwrap();
-        (done >= 2).then_some(())
-    })
-    .await;
+    until("some shards", async || (shards(&pool, DONE).await >= 2).then_some(())).await;
     pool.close().await;
     database.stop("immediate");
     tokio::time::sleep(Duration::from_secs(12)).await;
@@ -146,8 +146,7 @@ async fn a_study_goes_on_after_the_database_was_away_for_longer_than_its_parts_w
     let result: Value = api.get(&format!("{address}/result")).await.json().await.unwrap();
     assert_eq!((&result["result"]["succeeded"], &result["result"]["failed"]), (&json!(60), &json!(0)));
     let pool = database.pool().await;
-    let left: i64 = sqlx::query_scalar("SELECT count(*) FROM precut.studies").fetch_one(&pool).await.unwrap();
-    assert_eq!(left, 0, "what is done leaves no parts behind");
+    assert_eq!(shards(&pool, "true").await, 0, "what is done leaves no shards behind");
     worker.stop();
     api.stop();
 }

@@ -62,7 +62,7 @@ async fn with_a_full_disk_answers_go_on_jobs_are_refused_and_nothing_breaks() {
     let first = service.accepted(&job(100, 20)).await;
     service.over(&first).await;
     let running = service.accepted(&job(101, 1500)).await;
-    // A study puts its parts down while it runs: it goes on without.
+    // A study writes its shards while it runs: it goes on once there is room.
     let study = json!({
         "calculator": "sagging-bar", "job": {"load_n": 1, "duration_ms": 30},
         "vary": [{"pointer": "/length_mm", "from": 200, "to": 239, "count": 40}],

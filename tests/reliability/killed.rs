@@ -194,7 +194,7 @@ async fn check(service: &Service, addresses: &[String], finished: &BTreeMap<Stri
 
 const POINTS: usize = 200;
 
-/// So many points of 20 ms each, every one of them put down by itself: it is estimated at half a second.
+/// So many points of 20 ms each, every one of them a shard of its own: it is estimated at half a second.
 fn study() -> Value {
     json!({
         "calculator": "sagging-bar", "job": {"load_n": 10, "duration_ms": 20, "work_ms": 500},
@@ -202,10 +202,11 @@ fn study() -> Value {
     })
 }
 
-/// The number of points that are put down.
-async fn put_down(folder: &Path) -> i64 {
+/// The number of shards that are done.
+async fn done(folder: &Path) -> i64 {
     let mut database = database(folder).await;
-    sqlx::query_scalar("SELECT count(*) FROM studies").fetch_one(&mut database).await.unwrap()
+    let done = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE parent IS NOT NULL AND state = 'succeeded'");
+    done.fetch_one(&mut database).await.unwrap()
 }
 
 #[tokio::test]
@@ -219,12 +220,12 @@ async fn a_study_that_gets_on_is_finished_however_often_its_process_is_killed() 
     let address = header(&response, "location").to_owned();
     let mut stood = Vec::new();
     for _ in 0..KILLS {
-        let before = put_down(folder.path()).await;
+        let before = done(folder.path()).await;
         let is_over = until("the study to get on", async || {
-            if put_down(folder.path()).await > before {
+            if done(folder.path()).await > before {
                 return Some(false);
             }
-            // Its parts are forgotten with its end.
+            // Its shards are forgotten with its end.
             service.job(&address).await["finished_at"].is_string().then_some(true)
         })
         .await;
@@ -233,12 +234,12 @@ async fn a_study_that_gets_on_is_finished_however_often_its_process_is_killed() 
         }
         tokio::time::sleep(dice.time(0, 60)).await;
         service.kill();
-        stood.push(put_down(folder.path()).await);
+        stood.push(done(folder.path()).await);
         service = Service::start(folder.path(), &settings).await;
     }
     assert!(!stood.is_empty(), "it was over before the first kill");
-    let done = service.over(&address).await;
-    assert_eq!(done["state"], "succeeded", "{done:#}");
+    let over = service.over(&address).await;
+    assert_eq!(over["state"], "succeeded", "{over:#}");
     let result = service.get(&format!("{address}/result")).await.json::<Value>().await.unwrap();
     assert_eq!((&result["result"]["points"], &result["result"]["succeeded"]), (&json!(POINTS), &json!(POINTS)));
     service.stop();
@@ -249,9 +250,9 @@ async fn a_study_that_gets_on_is_finished_however_often_its_process_is_killed() 
     };
     let jobs = count(&mut database, "SELECT count(*) FROM jobs WHERE state = 'succeeded'").await;
     let results = count(&mut database, "SELECT count(*) FROM results").await;
-    let left = count(&mut database, "SELECT count(*) FROM studies").await;
+    let left = count(&mut database, "SELECT count(*) FROM jobs WHERE parent IS NOT NULL").await;
     println!(
-        "a study killed {} times, with {stood:?} of {POINTS} points put down: {jobs} job with {results} results, its \
+        "a study killed {} times, with {stood:?} of {POINTS} shards done: {jobs} job with {results} results, its \
          own among them",
         stood.len()
     );

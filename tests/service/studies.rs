@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use sqlx::Connection as _;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 use crate::support::{Process, Server, header, problem, toy};
 
@@ -139,6 +141,10 @@ async fn a_long_study_is_one_job_with_one_progress_and_pictures_on_the_way() {
         let chunk = tokio::time::timeout(Duration::from_mins(1), stream.chunk()).await.expect("it goes on");
         events.push_str(std::str::from_utf8(&chunk.unwrap().expect("it goes on")).unwrap());
     }
+    // Its shards are jobs that nobody sees.
+    let listed: Value = server.get("/v1/jobs").send().await.unwrap().json().await.unwrap();
+    let listed: Vec<&Value> = listed["items"].as_array().unwrap().iter().map(|job| &job["id"]).collect();
+    assert_eq!(listed, [&running["id"]]);
     drop(held);
     let done = until(&server, &address, |job| job["state"] == "succeeded").await;
     assert_eq!((&done["calculator"], &done["progress"]), (&json!("studies"), &json!(1.0)));
@@ -166,11 +172,56 @@ async fn a_cancelled_study_stops_and_keeps_what_its_points_gave() {
 }
 
 #[tokio::test]
+async fn with_one_place_studies_end_and_none_holds_it_while_its_shards_are_computed() {
+    let server = Server::start_with(|config| {
+        config.jobs.slots = 1;
+        // No place beside it.
+        config.jobs.short_ms = 0.0;
+    })
+    .await;
+    let mut addresses = Vec::new();
+    for length_mm in [100, 200, 300] {
+        let mut study = long(24, 40);
+        study["vary"][0]["from"] = json!(length_mm);
+        study["vary"][0]["to"] = json!(length_mm + 24);
+        let response = server.post_to(STUDIES, study.to_string()).send().await.unwrap();
+        assert_eq!(response.status(), 202);
+        addresses.push(header(&response, "location").to_owned());
+    }
+    for address in &addresses {
+        let done = until(&server, address, |job| job["finished_at"].is_string()).await;
+        assert_eq!((&done["state"], &done["attempt"]), (&json!("succeeded"), &json!(1)), "{done:#}");
+    }
+    // A study that is cancelled gives the place to the next.
+    let response = server.post_to(STUDIES, long(1000, 41).to_string()).send().await.unwrap();
+    let address = header(&response, "location").to_owned();
+    until(&server, &address, |job| job["progress"].as_f64().unwrap() > 0.0).await;
+    assert_eq!(server.client.delete(server.url(&address)).send().await.unwrap().status(), 202);
+    let next = server.post_to(STUDIES, long(24, 42).to_string()).header("prefer", "wait=30").send().await.unwrap();
+    assert_eq!(next.status(), 200);
+}
+
+#[tokio::test]
+async fn a_study_of_more_shards_than_are_in_line_at_a_time_has_all_its_rows() {
+    let server = Server::start().await;
+    let mut study = long(300, 0);
+    // Each of them a shard of its own, by its estimate.
+    study["job"]["work_ms"] = json!(500);
+    let response = server.post_to(STUDIES, study.to_string()).header("prefer", "wait=60").send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    assert_eq!(response.json::<Value>().await.unwrap()["result"]["succeeded"], 300);
+    let metrics = server.get("/metrics").send().await.unwrap().text().await.unwrap();
+    let computed = metrics.lines().find_map(|line| line.strip_prefix("precut_jobs_shards_total ")).unwrap();
+    assert!(computed.parse::<f64>().unwrap() >= 300.0, "{computed}");
+}
+
+#[tokio::test]
 async fn a_study_gives_the_same_bytes_on_one_core_and_on_many() {
     let mut bodies = Vec::new();
     for slots in [1, 4] {
         let server = Server::start_with(|config| config.jobs.slots = slots).await;
-        let mut study = long(150, 3);
+        // Three shards.
+        let mut study = long(320, 3);
         // Where the load is too large for the length, a row without an answer.
         study["vary"][0]["from"] = json!(5);
         let response = server.post_to(STUDIES, study.to_string()).header("prefer", "wait=60").send().await.unwrap();
@@ -203,7 +254,7 @@ async fn a_study_that_its_process_took_along_goes_on_where_it_stood() {
     let address = header(&response, "location").to_owned();
     let ask = async |process: &Process, path: &str| client.get(url(process, path)).send().await.unwrap();
     let begun = Instant::now();
-    // Shards of 500 ms are put down: by the middle there are some.
+    // What is said to be done is on record, in shards of 500 ms.
     while ask(&process, &address).await.json::<Value>().await.unwrap()["progress"].as_f64().unwrap() < 0.5 {
         assert!(begun.elapsed() < Duration::from_mins(1));
         tokio::time::sleep(Duration::from_millis(20)).await;
@@ -211,6 +262,12 @@ async fn a_study_that_its_process_took_along_goes_on_where_it_stood() {
     process.signal("KILL");
     process.wait(Duration::from_mins(1));
     drop(process);
+    // And the disk has changed one of them: it is computed again, from what its points gave.
+    let database = SqliteConnectOptions::new().filename(folder.path().join("precut.db"));
+    let mut database = SqliteConnection::connect_with(&database).await.unwrap();
+    let damage = "UPDATE jobs SET content = substr(content, 1, length(content) - 1) WHERE shard = 0";
+    assert_eq!(sqlx::query(damage).execute(&mut database).await.unwrap().rows_affected(), 1);
+    database.close().await.unwrap();
 
     let process = Process::start_with(folder.path(), &[slots]);
     let begun = Instant::now();
@@ -228,7 +285,7 @@ async fn a_study_that_its_process_took_along_goes_on_where_it_stood() {
         line.starts_with("precut_calculations_total") && line.contains(toy::BAR) && line.contains("\"ok\"")
     });
     let computed: u32 = line.and_then(|line| line.rsplit(' ').next()?.parse().ok()).unwrap();
-    assert!((1..=50).contains(&computed), "{computed} of 80 points were computed again or anew");
+    assert!((1..=40).contains(&computed), "{computed} of 80 points: none of those that were done before");
     let result: Value = ask(&process, &format!("{address}/result")).await.json().await.unwrap();
     assert_eq!(result["result"]["succeeded"], 80);
     // Equal to the same study that nothing interrupted.

@@ -28,10 +28,11 @@ impl Feeds {
         Feed { feeds: Arc::clone(self), id, news }
     }
 
-    /// Something about these jobs has changed.
+    /// Something about these jobs has changed; of shards it is told to who asks for all of their parent's.
     pub(crate) fn touch(&self, ids: &[JobId]) {
         let feeds = self.lock();
-        for line in ids.iter().filter_map(|id| feeds.get(id)) {
+        let ids = ids.iter().flat_map(|&id| [Some(id), id.of_siblings()]).flatten();
+        for line in ids.filter_map(|id| feeds.get(&id)) {
             line.news.send_replace(());
         }
     }

@@ -18,12 +18,13 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 
 use super::running::Running;
-use super::work::Work;
+use super::work::{Work, answer};
 use super::{MOST_ATTEMPTS, fault, work};
 use crate::engine::exec::{Slot, guarded};
 use crate::engine::read::Ready;
 use crate::engine::{Engine, Error, Inner, Stored, compute, outcome};
 use crate::registry::Registry;
+use crate::store::jobs::Ending;
 
 /// What comes before the answer in the output of the process; whatever else a program prints stands before it.
 const ANSWER: &[u8] = b"\x01precut answer\n";
@@ -58,31 +59,35 @@ impl Work for Isolated {
         engine: Arc<Inner>,
         running: Arc<Running>,
         slot: Slot,
-    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
+    ) -> BoxFuture<'static, Result<Ending, Error>> {
         Box::pin(async move {
             let Self { ready, isolation } = *self;
             if let Some(kept) = engine.look_up(&ready.key).await {
-                return outcome(kept);
+                return outcome(kept).map(|stored| answer(&stored));
             }
             let (sender, receiver) = oneshot::channel();
             let this = Arc::clone(&engine);
             slot.line().push(move || {
                 let begun = Instant::now();
                 let given_up = || running.is_cancelled() || sender.is_closed();
-                let answer = guarded(|| answered(&ready, &isolation, &given_up));
+                let computed = guarded(|| compute_apart(&ready, &isolation, &given_up));
                 drop(slot);
-                let answer = answer.map(|body| Stored {
-                    key: ready.key,
-                    body,
-                    input: ready.canonical.clone(),
-                    entry: Arc::clone(&ready.entry),
-                });
                 // Nobody listens if the job was given up.
-                let _ = sender.send(this.keep(&ready, answer, begun.elapsed()));
+                let _ = sender.send(this.keep(&ready, computed, begun.elapsed()));
             });
-            receiver.await.unwrap_or(Err(Error::Crashed))
+            receiver.await.unwrap_or(Err(Error::Crashed)).map(|stored| answer(&stored))
         })
     }
+}
+
+/// Computes an answer in a process of its own.
+pub(crate) fn compute_apart(
+    ready: &Ready,
+    isolation: &Isolation,
+    given_up: &dyn Fn() -> bool,
+) -> Result<Stored, Error> {
+    let body = answered(ready, isolation, given_up)?;
+    Ok(Stored { key: ready.key, body, input: ready.canonical.clone(), entry: Arc::clone(&ready.entry) })
 }
 
 fn answered(ready: &Ready, isolation: &Isolation, given_up: &dyn Fn() -> bool) -> Result<Bytes, Error> {

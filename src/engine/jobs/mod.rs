@@ -22,10 +22,14 @@
 //!
 //! Each start is charged, and a charge says nothing of who ended the process. At the last of [`MOST_ATTEMPTS`] a job runs
 //! alone and in a process of its own ([`isolated`]): one that ends even that is failed as `crashed_repeatedly`, and one whose
-//! service is killed meanwhile is taken up again, however often. A start that a shutdown interrupts is not charged. A study
-//! runs in the service's own process at its last attempt, too, and that attempt is not charged while it gets on in it (it has
-//! put a part down, which is not computed again): however often its process is killed, it is finished. A panic is no such
-//! start: it is caught, and the job fails at once, as it would panic again.
+//! service is killed meanwhile is taken up again, however often. A start that a shutdown interrupts is not charged. A panic
+//! is no such start: it is caught, and the job fails at once, as it would panic again.
+//!
+//! A large study is one job whose [`shards`] are jobs of their own in the same line, which nobody sees. The study holds no
+//! place while others compute them. It runs in the service's own process at its last attempt, too, and that attempt is not
+//! charged while it gets on in it (a shard ends, which is not computed again): however often its process is killed, it is
+//! finished. A shard that may have ended its processes runs alone, with each of its points in a process of its own; if one of
+//! these ends that, the study fails with the shard.
 //!
 //! # What else may be a job
 //!
@@ -38,10 +42,10 @@
 mod estimate;
 mod fault;
 mod feeds;
-mod help;
 mod isolated;
 mod requests;
 mod running;
+mod shards;
 mod short;
 mod sweeper;
 pub(crate) mod work;
@@ -50,6 +54,7 @@ mod worker;
 pub(crate) use fault::{finding_of, message, message_of, note};
 pub use feeds::Feed;
 pub use isolated::Isolation;
+pub(crate) use isolated::compute_apart;
 pub use requests::Answered;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -161,6 +166,7 @@ pub(crate) struct Jobs {
     pub(crate) estimates: Estimates,
     feeds: Arc<Feeds>,
     computations: Arc<Computations>,
+    plans: shards::Plans,
     new_deadline: Notify,
     /// There is something to do.
     came: watch::Sender<()>,
@@ -177,6 +183,7 @@ impl Jobs {
             estimates: Estimates::default(),
             feeds: Arc::default(),
             computations: Arc::default(),
+            plans: shards::Plans::default(),
             new_deadline: Notify::new(),
             came: watch::channel(()).0,
             ended: Notify::new(),
@@ -204,7 +211,7 @@ impl Jobs {
         jobs.store.tell(Arc::new(move |news| match news {
             News::Waiting => came.send_replace(()),
             News::Changed(Changed { jobs, unwanted }) => {
-                computations.cancel(&unwanted);
+                computations.give_up(&unwanted);
                 feeds.touch(&jobs);
             }
             News::Library => generation.changed(),
@@ -327,7 +334,7 @@ impl Jobs {
     pub(crate) async fn cancel(&self, id: JobId) -> Result<(Job, JobState), Error> {
         let cancelled = self.store.cancel(id).await?.ok_or(Error::UnknownJob(id))?;
         if let Some(lease) = cancelled.unwanted {
-            self.computations.cancel(&[lease]);
+            self.computations.give_up(&[lease]);
         }
         if !cancelled.before.is_final() {
             self.feeds.touch(&[id]);

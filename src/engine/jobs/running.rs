@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::watch;
+use tokio::sync::{Notify, OwnedSemaphorePermit, watch};
 
 use super::fault;
 use crate::engine::progress::{Progress, Reported};
@@ -12,13 +12,19 @@ use crate::store::jobs::{Beat, Lease};
 
 /// The computations of this process.
 #[derive(Default)]
-pub(crate) struct Computations(Mutex<HashMap<Lease, Arc<Running>>>);
+pub(crate) struct Computations {
+    all: Mutex<HashMap<Lease, Arc<Running>>>,
+    /// Some of them may not be wanted any more.
+    doubt: Notify,
+}
 
 /// A computation for one or more equal jobs.
 pub(crate) struct Running {
     lease: Lease,
     progress: Mutex<Arc<Progress>>,
     cancel: watch::Sender<bool>,
+    /// The right to be one of those that run at the same time.
+    place: Mutex<Option<OwnedSemaphorePermit>>,
     /// Whether jobs are on record as served by it.
     claimed: AtomicBool,
 }
@@ -30,6 +36,7 @@ impl Computations {
             lease: Lease::new(),
             progress: Mutex::default(),
             cancel: watch::channel(false).0,
+            place: Mutex::default(),
             claimed: AtomicBool::new(false),
         });
         self.lock().insert(running.lease, Arc::clone(&running));
@@ -40,6 +47,19 @@ impl Computations {
     pub(super) fn reported(&self, lease: Lease) -> Option<Reported> {
         let running = self.lock().get(&lease).cloned()?;
         Some(running.reported())
+    }
+
+    /// Jobs were given up: nobody wants these any more, and where one of them had shards, nor these.
+    pub(super) fn give_up(&self, leases: &[Lease]) {
+        if !leases.is_empty() {
+            self.cancel(leases);
+            self.doubt.notify_one();
+        }
+    }
+
+    /// Waits until some may not be wanted any more.
+    pub(super) async fn doubt(&self) {
+        self.doubt.notified().await;
     }
 
     /// Nobody wants these any more.
@@ -68,7 +88,7 @@ impl Computations {
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<Lease, Arc<Running>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.all.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -76,6 +96,16 @@ impl Running {
     /// Its right to write.
     pub(super) fn lease(&self) -> Lease {
         self.lease
+    }
+
+    /// It runs in that place until its end is on record.
+    pub(super) fn take_place(&self, place: Option<OwnedSemaphorePermit>) {
+        *self.place.lock().unwrap_or_else(PoisonError::into_inner) = place;
+    }
+
+    /// It runs on without a place: others do what there is to be done.
+    pub(super) fn give_place_back(&self) {
+        self.take_place(None);
     }
 
     /// Jobs are served by it.

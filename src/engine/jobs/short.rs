@@ -28,7 +28,7 @@ async fn run_next(engine: &Arc<Inner>) -> bool {
         Ok(slot) = engine.cores.short_job_slot() => slot,
         () = engine.jobs.stopped() => return false,
     };
-    let Some(work) = worker::next(engine, slot, most_ms).await else { return false };
+    let Some(work) = worker::next(engine, slot, None, most_ms).await else { return false };
     // A task of its own: it goes on where the job fails.
     let _ = tokio::spawn(work).await;
     true

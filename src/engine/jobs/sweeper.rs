@@ -40,6 +40,7 @@ async fn keep_beating(engine: Weak<Inner>) {
         tokio::select! {
             () = ended(&engine) => return,
             _ = beat.tick() => beats(&engine).await,
+            () = engine.jobs.computations.doubt() => beats(&engine).await,
         }
     }
 }
@@ -147,7 +148,7 @@ async fn deadlines(engine: &Arc<Inner>) -> Duration {
     let outcome = jobs.store.expire_deadlines(fault::written(&Error::DeadlineExceeded)).await;
     let Some((late, next)) = report("deadline", outcome) else { return BEAT };
     let longest = if jobs.store.is_shared() { LONGEST_SLEEP_SHARED } else { LONGEST_SLEEP };
-    jobs.computations.cancel(&late.unwanted);
+    jobs.computations.give_up(&late.unwanted);
     jobs.feeds.touch(&late.jobs);
     let wait = next.map(|at| u64::try_from(at.saturating_sub(jobs.store.now_ms())).unwrap_or(0));
     // At least a millisecond later: the clock counts whole ones.

@@ -1,4 +1,4 @@
-//! What a job does when it runs: one arm per [`JobKind`].
+//! What a job does when it runs: one arm per [`JobKind`], and shards.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,12 +11,14 @@ use tokio::sync::oneshot;
 use super::MOST_ATTEMPTS;
 use super::isolated::Isolated;
 use super::running::Running;
+use super::shards::{self, OneShard};
 use crate::engine::exec::{Slot, guarded};
 use crate::engine::read::Ready;
 use crate::engine::single_flight::Joined;
 use crate::engine::{Error, Inner, Stored, read};
+use crate::key::Key;
 use crate::registry::Entry;
-use crate::store::jobs::{Claim, JobKind};
+use crate::store::jobs::{Claim, Ending, JobKind};
 
 /// Something to run for jobs.
 pub(crate) trait Work: Send + Sync {
@@ -27,7 +29,12 @@ pub(crate) trait Work: Send + Sync {
         engine: Arc<Inner>,
         running: Arc<Running>,
         slot: Slot,
-    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>>;
+    ) -> BoxFuture<'static, Result<Ending, Error>>;
+}
+
+/// How work ends that came to an answer.
+pub(super) fn answer(stored: &Stored) -> Ending {
+    Ending::Succeeded(stored.kept())
 }
 
 /// The work of a claimed job, read back from its record.
@@ -35,8 +42,11 @@ pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> 
     match claim.kind {
         JobKind::Calculation => {
             let entry = engine.known(&claim.calculator)?;
+            if let Some(shard) = claim.shard {
+                return Ok(Box::new(OneShard { shard, entry, apart: claim.attempt >= MOST_ATTEMPTS }));
+            }
             if entry.is_composed() {
-                return Ok(Box::new(Composed { entry, input: claim.input.clone() }));
+                return Ok(Box::new(Composed { entry, input: claim.input.clone(), key: claim.key }));
             }
             let ready = ready(&entry, &claim.input)?;
             match &engine.settings.isolation {
@@ -56,10 +66,22 @@ pub(super) fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
     read::prepared(entry, &job)
 }
 
-/// An answer made of many: reading it is work, too.
+/// The same as work, which it is where the job is large.
+pub(super) async fn prepared(entry: &Arc<Entry>, input: Bytes, slot: &Slot) -> Result<Ready, Error> {
+    let (entry, (sender, receiver)) = (Arc::clone(entry), oneshot::channel());
+    slot.line().push(move || {
+        // Nobody listens if the job was given up.
+        let _ = sender.send(guarded(|| ready(&entry, &input)));
+    });
+    receiver.await.unwrap_or(Err(Error::Crashed))
+}
+
+/// An answer made of many: in shards, where that is worth it. A short job was let past the others, and its shards would wait
+/// behind them; a job that an earlier version accepted has another key by now, by which nobody would know its shards.
 struct Composed {
     entry: Arc<Entry>,
     input: Bytes,
+    key: Key,
 }
 
 impl Work for Composed {
@@ -68,15 +90,15 @@ impl Work for Composed {
         engine: Arc<Inner>,
         running: Arc<Running>,
         slot: Slot,
-    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
+    ) -> BoxFuture<'static, Result<Ending, Error>> {
         Box::pin(async move {
-            let (sender, receiver) = oneshot::channel();
-            slot.line().push(move || {
-                // Nobody listens if the job was given up.
-                let _ = sender.send(guarded(|| ready(&self.entry, &self.input)));
-            });
-            let ready = receiver.await.unwrap_or(Err(Error::Crashed))?;
-            Inner::calculate(&engine, ready, &running, slot).await
+            let ready = prepared(&self.entry, self.input, &slot).await?;
+            let apart = !slot.is_short() && ready.key == self.key;
+            let stored = match ready.prepared.sharded().filter(|_| apart) {
+                Some(sharded) => shards::gathered(&engine, (ready, sharded), &running, slot).await,
+                None => Inner::calculate(&engine, ready, &running, slot).await,
+            };
+            stored.map(|stored| answer(&stored))
         })
     }
 }
@@ -92,8 +114,10 @@ impl Work for Calculation {
         engine: Arc<Inner>,
         running: Arc<Running>,
         slot: Slot,
-    ) -> BoxFuture<'static, Result<Arc<Stored>, Error>> {
-        Box::pin(async move { Inner::calculate(&engine, self.ready, &running, slot).await })
+    ) -> BoxFuture<'static, Result<Ending, Error>> {
+        Box::pin(
+            async move { Inner::calculate(&engine, self.ready, &running, slot).await.map(|stored| answer(&stored)) },
+        )
     }
 }
 

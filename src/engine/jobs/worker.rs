@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 
 use futures_util::future::BoxFuture;
 use precut_calc::calculator::Failure;
-use tokio::sync::watch;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 use tokio::task::JoinSet;
 use tracing::Instrument;
 
 use super::running::{Begun, Running};
-use super::{Jobs, MOST_ATTEMPTS, fault, help, work};
+use super::{Jobs, MOST_ATTEMPTS, fault, work};
 use crate::engine::exec::Slot;
 use crate::engine::quota::worked;
-use crate::engine::{Error, Inner, Stored};
+use crate::engine::{Error, Inner};
 use crate::store::StoreError;
 use crate::store::jobs::{Claim, Claimed, Ending, JobId, Next, Wanted};
 use crate::trace::{self, TraceContext};
@@ -27,26 +27,29 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Takes jobs for all places until the service stops; returns when the last of them has ended.
 pub(super) async fn run(engine: Weak<Inner>) {
     let mut running = JoinSet::new();
+    let mut places = None;
     // After one job there may be another: that is found out by taking it.
     let mut may_wait = false;
     // Weak: who works for an engine does not keep it alive.
     while let Some(engine) = engine.upgrade().filter(|engine| !engine.jobs.is_stopped()) {
         while running.try_join_next().is_some() {}
-        if running.len() >= engine.cores.job_places() {
-            running.join_next().await;
-            continue;
-        }
+        // The end of a job is on record before the next begins in its place.
+        let places = places.get_or_insert_with(|| Arc::new(Semaphore::new(engine.cores.job_places())));
+        let place = tokio::select! {
+            Ok(place) = Arc::clone(places).acquire_owned() => place,
+            () = engine.jobs.stopped() => break,
+        };
         let mut came = engine.jobs.came();
         if !may_wait && !waits(&engine, None).await {
             idle(&engine.jobs, &mut came).await;
             continue;
         }
-        // Only with something to do: a study that uses cores to spare gives one back to who waits for it.
+        // Only with something to do: whoever runs alone waits until no place is taken.
         let slot = tokio::select! {
             Ok(slot) = engine.cores.job_slot(false) => slot,
             () = engine.jobs.stopped() => break,
         };
-        let next = next(&engine, slot, None).await;
+        let next = next(&engine, slot, Some(place), None).await;
         may_wait = next.is_some();
         match next {
             Some(work) => drop(running.spawn(work)),
@@ -76,7 +79,12 @@ pub(super) async fn waits(engine: &Inner, short_ms: Option<f64>) -> bool {
 }
 
 /// Takes what is to be done next; what does it, in that place.
-pub(super) async fn next(engine: &Arc<Inner>, slot: Slot, short_ms: Option<f64>) -> Option<BoxFuture<'static, ()>> {
+pub(super) async fn next(
+    engine: &Arc<Inner>,
+    slot: Slot,
+    place: Option<OwnedSemaphorePermit>,
+    short_ms: Option<f64>,
+) -> Option<BoxFuture<'static, ()>> {
     let begun = engine.jobs.computations.begin();
     let asked = AtomicBool::new(false);
     let take = || {
@@ -86,16 +94,23 @@ pub(super) async fn next(engine: &Arc<Inner>, slot: Slot, short_ms: Option<f64>)
     let next = stubbornly(engine, take).await?;
     let engine = Arc::clone(engine);
     match next {
-        Next::Run(claim) => Some(Box::pin(begin(engine, begun, claim, slot))),
-        Next::Suspect { id, calculator } => Some(Box::pin(run_alone(engine, id, calculator))),
-        Next::Help(shared) => Some(Box::pin(help::run(engine, shared, slot))),
+        Next::Run(claim) => {
+            begun.running.take_place(place);
+            Some(Box::pin(begin(engine, begun, claim, slot)))
+        }
+        Next::Suspect { id, calculator, is_shard } => {
+            // A study has no process of its own; the points of a shard have.
+            let is_whole = engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
+            let is_isolated = engine.settings.isolation.is_some() && (is_shard || is_whole);
+            Some(Box::pin(run_alone(engine, id, place, is_isolated)))
+        }
         Next::Nothing => None,
     }
 }
 
 /// Runs a job with nothing beside it: a start that takes the process along is charged to all that run, and before a job is
 /// given up as the one to blame, it is tried alone.
-async fn run_alone(engine: Arc<Inner>, id: JobId, calculator: String) {
+async fn run_alone(engine: Arc<Inner>, id: JobId, place: Option<OwnedSemaphorePermit>, is_isolated: bool) {
     let jobs = &engine.jobs;
     let waiting = engine.cores.job_slot(true);
     tokio::pin!(waiting);
@@ -111,10 +126,9 @@ async fn run_alone(engine: Arc<Inner>, id: JobId, calculator: String) {
         }
     };
     // In a process of its own it may be tried as often as somebody kills this one.
-    let is_isolated =
-        engine.settings.isolation.is_some() && engine.known(&calculator).is_ok_and(|entry| !entry.is_composed());
     let most = if is_isolated { u32::MAX } else { MOST_ATTEMPTS };
     let begun = jobs.computations.begin();
+    begun.running.take_place(place);
     let poison = fault::written(&Error::CrashedRepeatedly { attempts: MOST_ATTEMPTS });
     let claim = || jobs.store.claim(id, begun.running.lease(), most, poison.clone());
     match stubbornly(&engine, claim).await {
@@ -131,9 +145,12 @@ async fn run_alone(engine: Arc<Inner>, id: JobId, calculator: String) {
 }
 
 /// Runs what was claimed, if its owner may have it. Returns when its record says how it ended, or that it waits again.
-async fn begin(engine: Arc<Inner>, begun: Begun, claim: Claim, slot: Slot) {
+async fn begin(engine: Arc<Inner>, begun: Begun, claim: Box<Claim>, slot: Slot) {
     let jobs = &engine.jobs;
     begun.running.claimed();
+    if claim.shard.is_some() {
+        return run_claimed(&engine, &claim, &begun.running, slot).await;
+    }
     if let Err(error @ Error::KeptQuota { .. }) = engine.may_begin(&claim.owner).await {
         return refuse(&engine, &claim, &error).await;
     }
@@ -167,7 +184,9 @@ async fn refuse(engine: &Arc<Inner>, claim: &Claim, error: &Error) {
 /// Runs what was claimed in its place.
 async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, running: &Arc<Running>, slot: Slot) {
     let jobs = &engine.jobs;
-    tracing::info!(job = %claim.jobs[0], calculator = claim.calculator, attempt = claim.attempt, "a job begins");
+    if claim.shard.is_none() {
+        tracing::info!(job = %claim.jobs[0], calculator = claim.calculator, attempt = claim.attempt, "a job begins");
+    }
     let started = Instant::now();
     let outcome = match work::of(engine, claim) {
         Ok(work) => {
@@ -179,31 +198,49 @@ async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, running: &Arc<Running>,
         }
         Err(error) => Err(error),
     };
-    worked(&claim.owner, started.elapsed().as_secs_f64() * 1e3);
-    settle(engine, claim, outcome, started.elapsed(), running.is_cancelled()).await;
+    let (took, unwanted) = (started.elapsed(), running.is_cancelled());
+    if claim.shard.is_none() {
+        worked(&claim.owner, took.as_secs_f64() * 1e3);
+        count(claim, &outcome, took, unwanted);
+    }
+    settle(engine, claim, outcome, unwanted).await;
+}
+
+/// Counts how a job ended; one that waits again has not.
+fn count(claim: &Claim, outcome: &Result<Ending, Error>, took: Duration, unwanted: bool) {
+    let label = match outcome {
+        Ok(_) => "succeeded",
+        Err(Error::Cancelled) if unwanted => "cancelled",
+        Err(error) if waits_again(error) => return,
+        Err(error) => {
+            if let Error::CrashedRepeatedly { attempts } = error {
+                tracing::error!(job = %claim.jobs[0], attempts, "a job ended its process, the last time one of its own");
+                metrics::counter!("precut_jobs_poisonous_total").increment(claim.jobs.len() as u64);
+            }
+            "failed"
+        }
+    };
+    metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => label).increment(1);
+    if label != "cancelled" {
+        metrics::histogram!("precut_job_seconds", "calculator" => claim.calculator.clone()).record(took.as_secs_f64());
+    }
+    let ms = took.as_secs_f64() * 1e3;
+    tracing::info!(job = %claim.jobs[0], ms, outcome = label, "a job ends");
+}
+
+/// The service stops: the job waits for the next one, and its start does not count.
+fn waits_again(error: &Error) -> bool {
+    matches!(error, Error::Cancelled | Error::ShuttingDown | Error::Calculation(Failure::Cancelled))
 }
 
 /// Writes how a computation ended.
-async fn settle(
-    engine: &Arc<Inner>,
-    claim: &Claim,
-    outcome: Result<Arc<Stored>, Error>,
-    took: Duration,
-    unwanted: bool,
-) {
+async fn settle(engine: &Arc<Inner>, claim: &Claim, outcome: Result<Ending, Error>, unwanted: bool) {
     let jobs = &engine.jobs;
-    let ms = took.as_secs_f64() * 1e3;
-    let (ending, label) = match outcome {
-        Ok(stored) => (Ending::Succeeded(stored.kept()), "succeeded"),
+    let ending = match outcome {
+        Ok(ending) => ending,
         // Its jobs ended before it did.
-        Err(Error::Cancelled) if unwanted => {
-            metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => "cancelled")
-                .increment(1);
-            tracing::info!(job = %claim.jobs[0], ms, "a job was given up: nobody wants it any more");
-            return;
-        }
-        // The service stops: the job waits for the next one, and this start does not count.
-        Err(Error::Cancelled | Error::ShuttingDown | Error::Calculation(Failure::Cancelled)) => {
+        Err(Error::Cancelled) if unwanted => return,
+        Err(error) if waits_again(&error) => {
             match jobs.store.release(claim.lease).await {
                 Ok(back) => {
                     jobs.feeds.touch(&back);
@@ -213,25 +250,18 @@ async fn settle(
             }
             return;
         }
-        Err(error) => {
-            if let Error::CrashedRepeatedly { attempts } = error {
-                tracing::error!(job = %claim.jobs[0], attempts, "a job ended its process, the last time one of its own");
-                metrics::counter!("precut_jobs_poisonous_total").increment(claim.jobs.len() as u64);
-            }
-            (Ending::Failed(fault::written(&error)), "failed")
-        }
+        Err(error) => Ending::Failed(fault::written(&error)),
     };
-    metrics::counter!("precut_jobs_total", "calculator" => claim.calculator.clone(), "outcome" => label).increment(1);
-    metrics::histogram!("precut_job_seconds", "calculator" => claim.calculator.clone()).record(took.as_secs_f64());
     if let Some(ended) = stubbornly(engine, || jobs.store.finish(claim.lease, ending.clone())).await {
-        tracing::info!(job = %claim.jobs[0], ms, outcome = label, "a job ends");
         jobs.feeds.touch(&ended);
-        jobs.ended.notify_one();
+        if claim.shard.is_none() {
+            jobs.ended.notify_one();
+        }
     }
 }
 
 /// Tries until the store answers or the service stops: a place must not be left while its job is open.
-async fn stubbornly<T, F>(engine: &Arc<Inner>, attempt: impl Fn() -> F) -> Option<T>
+pub(super) async fn stubbornly<T, F>(engine: &Arc<Inner>, attempt: impl Fn() -> F) -> Option<T>
 where
     F: Future<Output = Result<T, StoreError>>,
 {

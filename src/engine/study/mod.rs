@@ -39,11 +39,12 @@ use serde_json::Value;
 use input::StudyInput;
 use plan::Plan;
 use result::StudyResult;
+use run::Shards;
 
 use crate::engine::names;
-use crate::key::Key;
 use crate::registry::{
-    Calculation, Entry, Job, Prepared, Registry, ResultNotes, Unprepared, UnreadableResult, canonical, second_line,
+    Calculation, Entry, Job, Prepared, Registry, ResultNotes, Sharded, Unprepared, UnreadableResult, canonical,
+    second_line,
 };
 
 /// Name of studies in routes and job files.
@@ -113,9 +114,8 @@ impl Calculation for Studies {
         let canonical = canonical(&plan.input)
             .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled study: {error}"))))?;
         let numbers_of = *plan.entry.meta();
-        let key = Key::of(&META, Some(&numbers_of), &canonical);
-        let study = Study { plan: Arc::new(plan), host: Arc::clone(&self.host), key };
-        let cost = study.plan.cost;
+        let (cost, plan) = (plan.cost, Arc::new(plan));
+        let study = Study { shards: Arc::new(Shards::new(&plan, &self.host)), plan };
         Ok(Prepared::new(cost, canonical, Box::new(study)).with_numbers_of(&numbers_of))
     }
 
@@ -156,8 +156,7 @@ fn read(envelope: &[u8]) -> Result<StudyResult, UnreadableResult> {
 /// A study that can run.
 struct Study {
     plan: Arc<Plan>,
-    host: Arc<dyn Host>,
-    key: Key,
+    shards: Arc<Shards>,
 }
 
 impl Job for Study {
@@ -180,13 +179,12 @@ impl Job for Study {
     }
 
     fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
-        let shards = run::run(&self.plan, &self.host, self.key, monitor)?;
-        let (result, notes) = report::report(&self.plan, shards);
+        let (result, notes) = report::report(&self.plan, self.shards.all(monitor)?);
         serde_json::to_writer(body, &result).map_err(|error| Failure::Internal(format!("the study: {error}")))?;
         Ok(notes)
     }
 
-    fn help(&self, monitor: &dyn Monitor, go_on: &mut dyn FnMut() -> bool) -> bool {
-        run::help(&self.plan, &self.host, self.key, monitor, go_on)
+    fn sharded(&self) -> Option<Arc<dyn Sharded>> {
+        self.shards.are_many().then(|| Arc::<Shards>::clone(&self.shards) as _)
     }
 }

@@ -25,9 +25,9 @@ const VALUES_LOOKED_AT: usize = 100_000;
 const POINT_MS: f64 = 0.2;
 /// What a row takes until the study is written, bytes.
 const ROW_BYTES: u64 = 600;
-/// What is lost at most when the process dies: work that is about to be put down, ms.
+/// What is lost at most when the process dies: the work of a shard that is computed, ms.
 const SHARD_MS: f64 = 500.0;
-/// Most points put down at once.
+/// Most points of a shard.
 const MOST_SHARD_POINTS: usize = 256;
 
 /// A study that can run.
@@ -40,7 +40,7 @@ pub(crate) struct Plan {
     pub(crate) outputs: Vec<Output>,
     pub(crate) shape: Shape,
     pub(crate) points: usize,
-    /// So many points are computed, and put down, together.
+    /// So many points are computed, and kept, together.
     pub(crate) shard_points: usize,
     pub(crate) cost: Cost,
     pub(crate) wanted: Wanted,

@@ -12,11 +12,11 @@ use super::host::Host;
 use super::pick::{Cited, Picked, Warning};
 use super::plan::Plan;
 use super::result::{Row, Status};
-use crate::engine::Quiet;
 use crate::engine::answer::Stored;
 use crate::engine::error::Error;
 use crate::engine::exec::guarded;
 use crate::engine::memory::Kept;
+use crate::registry::Unfinished;
 use crate::text::{Language, Texts};
 
 /// Some points that are done.
@@ -57,21 +57,21 @@ impl Warnings {
 }
 
 impl Shard {
-    /// Computes the points of a range; after each one `done` is told. `None` where it was cancelled.
+    /// Computes the points of a range, each `apart` where that is wanted; after each one `done` is told.
     pub(crate) fn compute(
         plan: &Plan,
         points: std::ops::Range<usize>,
         host: &dyn Host,
-        monitor: &dyn Monitor,
+        (monitor, apart): (&dyn Monitor, bool),
         mut done: impl FnMut(),
-    ) -> Option<Self> {
+    ) -> Result<Self, Unfinished> {
         let mut shard = Self::default();
         let mut warnings = Warnings::default();
         for point in points {
             if monitor.cancelled() {
-                return None;
+                return Err(Unfinished::Cancelled);
             }
-            let (row, picked) = compute(plan, point, host, monitor)?;
+            let (row, picked) = compute(plan, point, host, (monitor, apart))?;
             shard.rows.push(row);
             // Once per point, however many places of its answer warn of the same.
             let mut own = BTreeSet::new();
@@ -86,11 +86,16 @@ impl Shard {
             done();
         }
         shard.warnings = warnings.into_list();
-        Some(shard)
+        Ok(shard)
     }
 }
 
-fn compute(plan: &Plan, point: usize, host: &dyn Host, monitor: &dyn Monitor) -> Option<(Row, Picked)> {
+fn compute(
+    plan: &Plan,
+    point: usize,
+    host: &dyn Host,
+    (monitor, apart): (&dyn Monitor, bool),
+) -> Result<(Row, Picked), Unfinished> {
     let mut key = None;
     let outcome = guarded(|| plan.ready(point)).and_then(|ready| {
         key = Some(ready.key);
@@ -99,7 +104,7 @@ fn compute(plan: &Plan, point: usize, host: &dyn Host, monitor: &dyn Monitor) ->
             Some(Kept::Failure(failure)) => Err(Error::Calculation(failure)),
             None => {
                 let begun = Instant::now();
-                let outcome = guarded(|| crate::engine::compute(&ready, &Quiet(monitor)));
+                let outcome = guarded(|| host.compute(&ready, monitor, apart));
                 host.keep(&ready, outcome, begun.elapsed())
             }
         }
@@ -118,12 +123,13 @@ fn compute(plan: &Plan, point: usize, host: &dyn Host, monitor: &dyn Monitor) ->
         key: key.map(|key| key.to_string()),
     };
     match picked {
-        Ok(picked) => Some((row(Status::Succeeded, None, picked.numbers.clone()), picked)),
-        Err(Error::Cancelled | Error::ShuttingDown) => None,
+        Ok(picked) => Ok((row(Status::Succeeded, None, picked.numbers.clone()), picked)),
+        Err(Error::Cancelled | Error::ShuttingDown) => Err(Unfinished::Cancelled),
+        Err(Error::CrashedRepeatedly { .. }) => Err(Unfinished::Deadly),
         Err(error) => {
             let (status, finding) = reason(&error);
             let nothing = vec![None; plan.outputs.len()];
-            Some((row(status, Some(&finding), nothing), Picked::default()))
+            Ok((row(status, Some(&finding), nothing), Picked::default()))
         }
     }
 }

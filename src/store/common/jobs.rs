@@ -6,21 +6,25 @@ use std::str::FromStr;
 use bytes::Bytes;
 
 use super::callbacks::{WithCallback, told};
+use super::results::insert;
+use super::shards;
 use crate::key::Key;
 use crate::store::callbacks::Callback;
-use crate::store::jobs::{Claim, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, Timing};
+use crate::store::jobs::{
+    Claim, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing,
+};
 use crate::store::row::ResultRow;
 use crate::store::sql::{Outcome, Session, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
 
-/// Which columns a [`RecordRow`] is read from.
+/// Which columns a [`RecordRow`] is read from. A shard has no record that anybody reads.
 macro_rules! records {
     ($rest:literal) => {
         concat!(
             "SELECT jobs.id, kind, calculator, key, jobs.state, stage, progress, attempt, jobs.lease, priority, problem,
                  estimate_ms, created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, ",
             told!(),
-            " FROM jobs LEFT JOIN callbacks ON callbacks.job = jobs.id ",
+            " FROM jobs LEFT JOIN callbacks ON callbacks.job = jobs.id WHERE parent IS NULL",
             $rest
         )
     };
@@ -126,12 +130,12 @@ fn read(read: WithCallback<RecordRow>) -> Outcome<JobRecord> {
 }
 
 pub(in crate::store) async fn record<S: Session>(connection: &mut S, id: JobId) -> Outcome<Option<JobRecord>> {
-    let row = connection.first(sql(records!("WHERE jobs.id = $1")).bind(id)).await?;
+    let row = connection.first(sql(records!(" AND jobs.id = $1")).bind(id)).await?;
     row.map(read).transpose()
 }
 
 pub(in crate::store) async fn list<S: Session>(connection: &mut S, query: JobQuery) -> Outcome<JobPage> {
-    let mut statement = sql(records!("WHERE true"));
+    let mut statement = sql(records!(""));
     if let Some(state) = query.state {
         statement.push(" AND jobs.state = ").push_bind(state.word());
     }
@@ -194,17 +198,32 @@ pub(in crate::store) struct Runnable {
     created_ms: i64,
     traceparent: Option<String>,
     tracestate: Option<String>,
+    parent: Option<Vec<u8>>,
+    shard: Option<i32>,
 }
 
 from_row!(Runnable {
-    id, key, state, kind, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate
+    id, key, state, kind, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate,
+    parent, shard
 });
 
 impl Runnable {
-    pub(in crate::store) fn claim(self, lease: Lease, jobs: Vec<JobId>) -> Outcome<Claim> {
-        Ok(Claim {
+    pub(in crate::store) const fn is_shard(&self) -> bool {
+        self.shard.is_some()
+    }
+
+    fn shard(&self) -> Outcome<Option<ShardId>> {
+        let Some((parent, number)) = self.parent.as_ref().zip(self.shard) else { return Ok(None) };
+        let parent = Key::from_bytes(parent).ok_or_else(|| unreadable("parent"))?;
+        Ok(Some(ShardId { parent, number: count(number) }))
+    }
+
+    pub(in crate::store) fn claim(self, lease: Lease, jobs: Vec<JobId>) -> Outcome<Box<Claim>> {
+        Ok(Box::new(Claim {
             lease,
             jobs,
+            key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
+            shard: self.shard()?,
             kind: JobKind::of_word(&self.kind).ok_or_else(|| unreadable("kind"))?,
             calculator: self.calculator,
             input: unpacked(&self.input.unwrap_or_default()),
@@ -213,43 +232,62 @@ impl Runnable {
             created_ms: self.created_ms,
             traceparent: self.traceparent,
             tracestate: self.tracestate,
-        })
+        }))
     }
 }
 
 /// The result of an ending.
-pub(in crate::store) fn result_of(ending: &PackedEnding) -> Option<&ResultRow> {
+fn result_of(ending: &PackedEnding) -> Option<&ResultRow> {
     match ending {
         PackedEnding::Succeeded(result) => Some(result),
-        PackedEnding::Failed(_) => None,
+        PackedEnding::Shard(_) | PackedEnding::Failed(_) => None,
     }
 }
 
-/// Ends what is computed under a lease.
-pub(in crate::store) async fn end<S: Session>(
+/// Ends what is computed under a lease, and keeps what it came to.
+pub(in crate::store) async fn finish<S: Session>(
     connection: &mut S,
     lease: Lease,
     ending: &PackedEnding,
     (now, keep_ms): (i64, i64),
 ) -> Outcome<Vec<JobId>> {
-    let (state, problem) = match ending {
-        PackedEnding::Succeeded(_) => (JobState::Succeeded, None),
-        PackedEnding::Failed(problem) => (JobState::Failed, Some(problem.as_str())),
+    let ended = end(connection, lease, ending, (now, keep_ms)).await?;
+    match (ending, ended.first()) {
+        (PackedEnding::Succeeded(result), Some(_)) => {
+            insert(connection, std::slice::from_ref(result), now).await?;
+        }
+        (PackedEnding::Shard(_), Some((_, Some(parent), turn))) => shards::go_on(connection, parent, *turn).await?,
+        _ => {}
+    }
+    ended.iter().map(|(id, ..)| parsed(id)).collect()
+}
+
+/// The ids of those that ended, with the key of the parent, of a shard, and the turn.
+async fn end<S: Session>(
+    connection: &mut S,
+    lease: Lease,
+    ending: &PackedEnding,
+    (now, keep_ms): (i64, i64),
+) -> Outcome<Vec<(String, Option<Vec<u8>>, i64)>> {
+    let (state, content, problem) = match ending {
+        PackedEnding::Succeeded(_) => (JobState::Succeeded, None, None),
+        PackedEnding::Shard(content) => (JobState::Succeeded, Some(content.clone()), None),
+        PackedEnding::Failed(problem) => (JobState::Failed, None, Some(problem.as_str())),
     };
     let result = result_of(ending);
     let ended = sql("UPDATE jobs
          SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = $5, key = coalesce($6, key),
-             result_bytes = $7
-         WHERE lease = $1 AND state = 'running' RETURNING id");
+             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = CASE WHEN parent IS NULL THEN $5 END,
+             key = coalesce($6, key), result_bytes = $7, content = $8
+         WHERE lease = $1 AND state = 'running' RETURNING id, parent, turn");
     let ended = ended.bind(lease).bind(state.word()).bind(problem).bind(now).bind(now.saturating_add(keep_ms));
     let ended = ended.bind(result.map(|result| result.key.clone())).bind(result.map_or(0, ResultRow::bytes));
-    changed(connection, ended).await
+    connection.all(ended.bind(content)).await
 }
 
 /// Puts the running jobs of a lease back in line that were last heard of at `heard_ms` or before: `charged` says whether the
 /// start counts. One that was charged twice goes behind all others: whatever took its process along twice shall take nobody
-/// along any more.
+/// along any more. A shard keeps its turn, its parent's or the one behind all others.
 pub(in crate::store) async fn put_back<S: Session>(
     connection: &mut S,
     lease: &str,
@@ -259,9 +297,9 @@ pub(in crate::store) async fn put_back<S: Session>(
     let back = sql("UPDATE jobs
          SET state = 'queued', lease = NULL, heartbeat_ms = NULL, started_ms = NULL, progress = 0.0, stage = NULL,
              attempt = CASE WHEN attempt > $2 THEN attempt - $2 ELSE 0 END,
-             turn = CASE WHEN $2 = 0 AND attempt > 1
+             turn = CASE WHEN $2 = 0 AND attempt > 1 AND parent IS NULL
                     THEN 1 + (SELECT max(turn) FROM jobs AS other WHERE other.priority = jobs.priority
-                              AND other.state IN ('queued', 'running'))
+                              AND other.state IN ('queued', 'running') AND other.parent IS NULL)
                     ELSE turn END
          WHERE lease = $1 AND state = 'running' AND coalesce(heartbeat_ms, 0) <= $3 RETURNING id");
     changed(connection, back.bind(lease).bind(i64::from(!charged)).bind(heard_ms)).await

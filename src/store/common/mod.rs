@@ -5,4 +5,5 @@ mod documents;
 pub(super) mod jobs;
 mod processes;
 pub(super) mod results;
+pub(super) mod shards;
 pub(super) mod usage;

@@ -7,6 +7,7 @@ use super::{PostgresStore, lock, news, texts};
 use crate::key::Key;
 use crate::store::StoreError;
 use crate::store::common::jobs::{ids, parsed, unwanted};
+use crate::store::common::shards::forget_orphans;
 use crate::store::common::usage::forget_work;
 use crate::store::jobs::{Changed, JobId, Lease, Live};
 use crate::store::sql::Outcome;
@@ -91,7 +92,7 @@ impl PostgresStore {
             "INSERT INTO workers (id, engine, seen_ms) VALUES ($1, $2, now_ms())
              ON CONFLICT (id) DO UPDATE SET seen_ms = excluded.seen_ms",
         )
-        .bind(self.held.name())
+        .bind(self.worker.to_string())
         .bind(&self.engine)
         .execute(&self.pool)
         .await?;
@@ -233,15 +234,7 @@ async fn forget(connection: &mut PgConnection, keep_ms: i64) -> Outcome<u64> {
         .bind(TIMINGS)
         .execute(&mut *connection)
         .await?;
-    // Parts of studies that no job waits for.
-    for deserted in [
-        "DELETE FROM shared_studies WHERE created_ms < now_ms() - $1 AND NOT EXISTS (
-             SELECT FROM jobs WHERE key = study AND state IN ('queued', 'running'))",
-        "DELETE FROM studies WHERE created_ms < now_ms() - $1 AND NOT EXISTS (
-             SELECT FROM jobs WHERE key = study AND state IN ('queued', 'running'))",
-    ] {
-        sqlx::query(deserted).bind(keep_ms).execute(&mut *connection).await?;
-    }
+    forget_orphans(connection).await?;
     Ok(gone.rows_affected())
 }
 

@@ -2,31 +2,23 @@
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use sqlx::postgres::PgConnection;
 
 use super::line::submit;
-use super::run::{beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
+use super::run::{add_shards, beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
 use super::writer::LIST_PATIENCE;
-use super::{PostgresStore, callbacks, column, news};
+use super::{PostgresStore, callbacks};
 use crate::key::Key;
 use crate::store::common::callbacks::settle;
 use crate::store::common::jobs::{self, record};
-use crate::store::common::results;
 use crate::store::common::usage::{kept_by_owner, note_work, usage};
+use crate::store::common::{results, shards};
 use crate::store::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, Hear, JobCounts, JobId, JobPage, JobQuery,
-    JobRecord, JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
+    JobRecord, JobStore, Lease, Live, NewJob, Next, Shard, TakeUp, Timing, Tried, Usage, Wanted,
 };
-use crate::store::sql::{Outcome, Reads as _};
+use crate::store::sql::Reads as _;
 use crate::store::sqlite_jobs::pack::{packed, packed_ending};
-use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError, Taken};
-
-/// So many are asked for help at most.
-const MOST_HELP: i32 = 256;
-/// The same for each worker that is there.
-const HELP_PER_WORKER: i32 = 4;
-/// A worker that was heard of within this time is there.
-const HERE_MS: i64 = 15_000;
+use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError};
 
 impl ResultStore for PostgresStore {
     fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
@@ -75,24 +67,6 @@ impl ResultStore for PostgresStore {
             self.pool.close().await;
         })
     }
-    fn put_shard(&self, study: Key, shard: u32, content: Bytes) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.put_down(study, shard, content))
-    }
-    fn shards(&self, study: Key) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
-        Box::pin(self.done(study, None))
-    }
-    fn some_shards(&self, study: Key, wanted: Vec<u32>) -> BoxFuture<'_, Result<Vec<(u32, Bytes)>, StoreError>> {
-        Box::pin(self.done(study, Some(wanted)))
-    }
-    fn forget_shards(&self, study: Key) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.forget_study(study))
-    }
-    fn take_shard(&self, study: Key, of: u32) -> BoxFuture<'_, Result<Taken, StoreError>> {
-        Box::pin(self.take(study, of))
-    }
-    fn give_shard_back(&self, study: Key, shard: u32) {
-        self.give_back(study, shard);
-    }
 }
 
 impl PostgresStore {
@@ -108,6 +82,10 @@ impl PostgresStore {
     }
 
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
+        // What is done is not computed again: without this its points would have no answers.
+        if matches!(ending, Ending::Shard(_)) && !self.writer.flush(self.patience.points).await {
+            return Err(StoreError::Failed("the results of a shard's points are not written yet".to_owned()));
+        }
         let ending = packed_ending(ending).await?;
         let (keep_ms, key) = (self.keep_ms, ending.key());
         let ended = self
@@ -118,29 +96,6 @@ impl PostgresStore {
         }
         Ok(ended)
     }
-
-    async fn help(&self, key: Key, most: u32) -> Result<(), StoreError> {
-        let engine = self.engine.clone();
-        self.write(|connection| Box::pin(call(connection, key, most, engine))).await
-    }
-}
-
-/// Asks for help with the job that is computed under a key.
-async fn call(connection: &mut PgConnection, key: Key, most: u32, engine: String) -> Outcome<()> {
-    sqlx::query(
-        "UPDATE jobs SET help = least(help + $2, $3, $4 * (
-             SELECT count(*) FROM workers WHERE engine = $5 AND seen_ms > now_ms() - $6))
-         WHERE id = (SELECT id FROM jobs WHERE key = $1 AND state = 'running' ORDER BY id LIMIT 1)",
-    )
-    .bind(key.as_bytes().as_slice())
-    .bind(column(most))
-    .bind(MOST_HELP)
-    .bind(HELP_PER_WORKER)
-    .bind(engine)
-    .bind(HERE_MS)
-    .execute(&mut *connection)
-    .await?;
-    news::call(connection).await
 }
 
 impl JobStore for PostgresStore {
@@ -160,10 +115,10 @@ impl JobStore for PostgresStore {
         Box::pin(async {
             let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) =
                 sqlx::query_as(
-                    "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
-                     (SELECT count(*) FROM jobs WHERE state = 'running'),
+                    "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued' AND parent IS NULL),
+                     (SELECT count(*) FROM jobs WHERE state = 'running' AND parent IS NULL),
                      (SELECT count(*) FROM callbacks WHERE state = 'pending'),
-                     (SELECT created_ms FROM jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                     (SELECT created_ms FROM jobs WHERE state = 'queued' AND parent IS NULL ORDER BY id LIMIT 1),
                      (SELECT sum(pg_total_relation_size(oid))::bigint FROM pg_class WHERE relkind = 'r'
                           AND relnamespace = 'precut'::regnamespace)",
                 )
@@ -195,6 +150,15 @@ impl JobStore for PostgresStore {
     }
     fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.finish_job(lease, ending))
+    }
+    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(self.write(move |connection| Box::pin(async move { add_shards(connection, lease, &numbers).await })))
+    }
+    fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>> {
+        Box::pin(async move { Ok(shards::over(&mut *self.reader().await?, parent, &numbers).await?) })
+    }
+    fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>> {
+        Box::pin(async move { Ok(shards::input_of(&mut *self.reader().await?, key).await?) })
     }
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.write(move |connection| Box::pin(requeue(connection, lease, false, None))))
@@ -263,8 +227,5 @@ impl JobStore for PostgresStore {
     }
     fn tell(&self, hear: Hear) {
         self.newsroom.to(hear);
-    }
-    fn call_for_help(&self, key: Key, most: u32) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.help(key, most))
     }
 }

@@ -30,9 +30,9 @@ async fn facts(connection: &mut PgConnection, job: &NewJob, queue_limit: u64) ->
     sqlx::query_as(
         "SELECT running.lease, running.attempt, running.started_ms,
              (SELECT count(*) FROM jobs WHERE state = 'queued' AND owner = $2 AND priority = $3) AS own,
-             (SELECT min(turn) FROM (SELECT min(turn) AS turn FROM jobs WHERE state = 'queued' AND priority = $3
+             (SELECT min(turn) FROM (SELECT min(turn) AS turn FROM jobs WHERE state = 'queued' AND priority = $3 AND parent IS NULL
                  UNION ALL SELECT min(turn) FROM jobs WHERE state = 'running' AND priority = $3) AS turns) AS first,
-             (SELECT count(*) FROM (SELECT FROM jobs WHERE state = 'queued' LIMIT $4) AS waiting) AS queued
+             (SELECT count(*) FROM (SELECT FROM jobs WHERE state = 'queued' AND parent IS NULL LIMIT $4) AS waiting) AS queued
          FROM (VALUES (1)) AS one
          LEFT JOIN LATERAL (SELECT lease, attempt, started_ms FROM jobs WHERE key = $1 AND state = 'running' LIMIT 1)
              AS running ON true",

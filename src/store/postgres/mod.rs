@@ -14,7 +14,6 @@ mod news;
 mod results;
 mod run;
 mod start;
-mod studies;
 #[cfg(test)]
 mod tests;
 mod tls;
@@ -34,7 +33,6 @@ use crate::key::Key;
 use clock::Clock;
 use news::Newsroom;
 use run::Taker;
-use studies::Held;
 use writer::Writer;
 
 /// How long to wait for what.
@@ -48,7 +46,7 @@ pub(crate) struct Patience {
     pub(crate) grace: Duration,
     /// Between two looks for jobs of versions that nobody runs any more; so often a worker says that it lives.
     pub(crate) adoption: Duration,
-    /// A part of a study waits so long for the results of its points to be written.
+    /// A shard of a study waits so long for the results of its points to be written.
     pub(crate) points: Duration,
 }
 
@@ -85,7 +83,8 @@ pub(crate) struct PostgresStore {
     writer: Writer,
     newsroom: Newsroom,
     clock: Clock,
-    held: Held,
+    /// What this process is called among those that run jobs.
+    worker: Lease,
     keep_ms: i64,
     engine: String,
     works: bool,
@@ -103,7 +102,7 @@ impl PostgresStore {
         Ok(Self {
             writer: Writer::start(pool.clone(), usage.keep),
             newsroom: Newsroom::open(pool.clone()),
-            held: Held::start(pool.clone()),
+            worker: Lease::new(),
             clock,
             keep_ms,
             engine: usage.engine,

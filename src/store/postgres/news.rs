@@ -45,11 +45,6 @@ pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted
     Ok(())
 }
 
-/// Tells all processes that there is something to do.
-pub(super) async fn call(connection: &mut PgConnection) -> Outcome<()> {
-    say(connection, &Notice { waiting: true, ..Notice::default() }).await
-}
-
 async fn say(connection: &mut PgConnection, notice: &Notice) -> Outcome<()> {
     let text = serde_json::to_string(notice).map_err(|error| sqlx::Error::Encode(error.into()))?;
     sqlx::query("SELECT pg_notify($1, $2)").bind(CHANNEL).bind(text).execute(connection).await.map(drop)

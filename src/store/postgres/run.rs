@@ -3,13 +3,11 @@
 use sqlx::postgres::{PgConnection, PgPool};
 
 use super::{column, lock_job, lock_lease, news, texts};
-use crate::key::Key;
 use crate::store::common::jobs::{
-    Runnable, end, fail_of_owner, parsed, put_back, record, result_of, set_back, set_cancelled, unpacked, unreadable,
-    unwanted,
+    self, Runnable, fail_of_owner, parsed, put_back, record, set_back, set_cancelled, unwanted,
 };
-use crate::store::common::results::insert;
-use crate::store::jobs::{Beat, Cancelled, Claimed, JobId, JobState, Lease, MOST_ATTEMPTS, Next, Shared, Wanted};
+use crate::store::common::shards;
+use crate::store::jobs::{Beat, Cancelled, Claimed, JobId, JobState, Lease, MOST_ATTEMPTS, Next, Wanted};
 use crate::store::sql::Outcome;
 use crate::store::sqlite_jobs::pack::PackedEnding;
 
@@ -20,22 +18,18 @@ const LOOKED_AT: i64 = 64;
 macro_rules! taken {
     () => {
         "id, key, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
-         CASE WHEN id = $1 THEN input END AS input"
+         parent, shard, CASE WHEN id = $1 THEN input END AS input"
     };
 }
 
-/// What waits and may be taken: `$1` is the version, `$2` how long others keep away from what is held, `$3` the longest job.
+/// What waits and may be taken: `$1` is the version, `$2` how long others keep away from what is held, `$3` the longest job,
+/// which is no shard.
 macro_rules! in_line {
     () => {
         "state = 'queued' AND engine = $1 AND (heartbeat_ms IS NULL OR heartbeat_ms <= now_ms() - $2) \
-         AND ($3::float8 IS NULL OR (estimate_ms <= $3 AND attempt = 0))"
-    };
-}
-
-/// What is computed and wants help.
-macro_rules! wants_help {
-    () => {
-        "state = 'running' AND help > 0 AND engine = $1"
+         AND ($3::float8 IS NULL OR (estimate_ms <= $3 AND attempt = 0 AND parent IS NULL)) \
+         AND (parent IS NULL OR EXISTS ( \
+             SELECT FROM jobs AS whole WHERE whole.key = jobs.parent AND whole.state = 'running'))"
     };
 }
 
@@ -47,18 +41,12 @@ pub(super) struct Taker {
 }
 
 pub(super) async fn waits(pool: &PgPool, taker: &Taker, short_ms: Option<f64>) -> Outcome<bool> {
-    sqlx::query_scalar(concat!(
-        "SELECT EXISTS (SELECT FROM jobs WHERE ",
-        in_line!(),
-        ") OR ($3 IS NULL AND EXISTS (SELECT FROM jobs WHERE ",
-        wants_help!(),
-        "))"
-    ))
-    .bind(&taker.engine)
-    .bind(taker.silence_ms)
-    .bind(short_ms)
-    .fetch_one(pool)
-    .await
+    sqlx::query_scalar(concat!("SELECT EXISTS (SELECT FROM jobs WHERE ", in_line!(), ")"))
+        .bind(&taker.engine)
+        .bind(taker.silence_ms)
+        .bind(short_ms)
+        .fetch_one(pool)
+        .await
 }
 
 pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wanted, keep_ms: i64) -> Outcome<Next> {
@@ -74,32 +62,31 @@ pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wa
             return Ok(Next::Run(claim));
         }
     }
-    let Some((id, key, now)) = first(connection, &taker, wanted.short_ms).await? else {
-        return if wanted.short_ms.is_some() { Ok(Next::Nothing) } else { help(connection, &taker).await };
-    };
+    let Some((id, key, now)) = first(connection, &taker, wanted.short_ms).await? else { return Ok(Next::Nothing) };
     let start = Start { lease: wanted.lease, most: MOST_ATTEMPTS - 1, problem: None };
     let taken = start.taken(connection, (&id, &key, now), keep_ms).await?;
     if let Claimed::Run(claim) = claimed(connection, &id, wanted.lease, taken).await? {
         return Ok(Next::Run(claim));
     }
     // It waits no more, or it has been charged too often to run beside others.
-    let suspects: Vec<Option<String>> = sqlx::query_scalar(
+    let suspects: Vec<(Option<String>, bool)> = sqlx::query_as(
         "UPDATE jobs SET heartbeat_ms = $3 WHERE key = $2 AND state = 'queued'
-         RETURNING CASE WHEN id = $1 THEN calculator END",
+         RETURNING CASE WHEN id = $1 THEN calculator END, shard IS NOT NULL",
     )
     .bind(&id)
     .bind(&key)
     .bind(now)
     .fetch_all(connection)
     .await?;
-    Ok(match suspects.into_iter().flatten().next() {
-        Some(calculator) => Next::Suspect { id: parsed(&id)?, calculator },
+    let suspect = suspects.into_iter().find_map(|(calculator, is_shard)| Some((calculator?, is_shard)));
+    Ok(match suspect {
+        Some((calculator, is_shard)) => Next::Suspect { id: parsed(&id)?, calculator, is_shard },
         None => Next::Nothing,
     })
 }
 
 /// The first in line whose key nobody else has, with the lock of its key and the time. Who is about to take another is
-/// passed over, not waited for. Lower priorities let those pass who want help.
+/// passed over, not waited for.
 async fn first(
     connection: &mut PgConnection,
     taker: &Taker,
@@ -109,9 +96,7 @@ async fn first(
     sqlx::query_as(concat!(
         "WITH line AS MATERIALIZED (SELECT id, key FROM jobs WHERE ",
         in_line!(),
-        " AND ($3 IS NOT NULL OR priority >= coalesce((SELECT max(priority) FROM jobs WHERE ",
-        wants_help!(),
-        "), 0)) ORDER BY priority DESC, turn, id LIMIT $4)
+        " ORDER BY priority DESC, turn, id LIMIT $4)
          SELECT id, key, now_ms() FROM line WHERE pg_try_advisory_xact_lock(lock_of(key)) LIMIT 1"
     ))
     .bind(&taker.engine)
@@ -120,21 +105,6 @@ async fn first(
     .bind(LOOKED_AT)
     .fetch_optional(connection)
     .await
-}
-
-/// A job that wants help, which is then wanted of one less.
-async fn help(connection: &mut PgConnection, taker: &Taker) -> Outcome<Next> {
-    let helped: Option<(String, Vec<u8>, String, Vec<u8>)> = sqlx::query_as(concat!(
-        "UPDATE jobs SET help = help - 1 WHERE id = (SELECT id FROM jobs WHERE ",
-        wants_help!(),
-        " ORDER BY priority DESC, turn, id LIMIT 1 FOR UPDATE SKIP LOCKED) RETURNING id, key, calculator, input"
-    ))
-    .bind(&taker.engine)
-    .fetch_optional(connection)
-    .await?;
-    let Some((id, key, calculator, input)) = helped else { return Ok(Next::Nothing) };
-    let key = Key::from_bytes(&key).ok_or_else(|| unreadable("key"))?;
-    Ok(Next::Help(Shared { id: parsed(&id)?, key, calculator, input: unpacked(&input) }))
 }
 
 /// Under which lease jobs are taken. What was charged `most` starts already is failed with `problem`; without one it is
@@ -163,7 +133,7 @@ impl Start<'_> {
                  problem = CASE WHEN starts < $3 THEN NULL ELSE $6 END,
                  finished_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint END,
                  expires_ms = CASE WHEN starts < $3 THEN NULL ELSE $5::bigint + $7 END,
-                 progress = 0, stage = NULL, help = 0
+                 progress = 0, stage = NULL
              FROM (SELECT max(attempt) AS starts FROM jobs WHERE key = $2 AND state = 'queued'
                    HAVING bool_or(id = $1) AND ($6::text IS NOT NULL OR max(attempt) < $3)) AS charged
              WHERE key = $2 AND state = 'queued' RETURNING ",
@@ -212,10 +182,16 @@ async fn held(connection: &mut PgConnection, id: &str, lease: Lease) -> Outcome<
 
 async fn claimed(connection: &mut PgConnection, id: &str, lease: Lease, taken: Vec<Runnable>) -> Outcome<Claimed> {
     let jobs = taken.iter().map(|job| parsed(&job.id)).collect::<Outcome<Vec<JobId>>>()?;
-    news::tell(connection, &jobs, &[]).await?;
+    // Nobody watches a shard begin.
+    if !taken.iter().any(Runnable::is_shard) {
+        news::tell(connection, &jobs, &[]).await?;
+    }
     let Some(job) = taken.into_iter().find(|job| job.id == id) else { return Ok(Claimed::Nothing) };
     if job.state != JobState::Running.word() {
         return Ok(Claimed::Poisonous(jobs));
+    }
+    if job.is_shard() {
+        return Ok(Claimed::Run(job.claim(lease, jobs)?));
     }
     // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
     // Rows that somebody else is about to write are left alone; nobody waits here.
@@ -250,14 +226,16 @@ pub(super) async fn finish(
     keep_ms: i64,
 ) -> Outcome<Vec<JobId>> {
     let Some((_, now)) = lock_lease(connection, lease).await? else { return Ok(Vec::new()) };
-    let ended = end(connection, lease, ending, (now, keep_ms)).await?;
-    if let Some(result) = result_of(ending)
-        && !ended.is_empty()
-    {
-        insert(connection, std::slice::from_ref(result), now).await?;
-    }
+    let ended = jobs::finish(connection, lease, ending, (now, keep_ms)).await?;
     news::tell(connection, &ended, &[]).await?;
     Ok(ended)
+}
+
+pub(super) async fn add_shards(connection: &mut PgConnection, lease: Lease, numbers: &[u32]) -> Outcome<bool> {
+    if lock_lease(connection, lease).await?.is_none() {
+        return Ok(false);
+    }
+    shards::add(connection, lease, numbers, ", engine").await
 }
 
 /// Puts the running jobs of a lease back in line, see [`put_back`]: `silent_for_ms` says that it has to have been silent for

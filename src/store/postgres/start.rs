@@ -15,7 +15,7 @@ use crate::store::OpenError;
 use crate::store::address::Secret;
 
 /// What this program knows of the tables: the number of its last migration.
-pub(super) const SCHEMA: i32 = 13;
+pub(super) const SCHEMA: i32 = 14;
 /// How long a request waits for a connection before it is told that the store does not serve; in tests, which share their
 /// cores with many others, as long as that never says anything of them.
 const ACQUIRE: Duration = Duration::from_secs(if cfg!(test) { 60 } else { 2 });

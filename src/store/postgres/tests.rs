@@ -12,10 +12,10 @@ use tokio::sync::{OnceCell, mpsc};
 use super::*;
 use crate::store::address::StoreAddress;
 use crate::store::jobs::{
-    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News, Next, Priority, Wanted,
+    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News, Next, Wanted,
 };
 use crate::store::suite::{MOST, PROBLEM, Place, job, keep, key, result, suite};
-use crate::store::{ResultStore, Store, Taken};
+use crate::store::{ResultStore, Store};
 
 const SERVER: &str = "PRECUT_TEST_POSTGRES";
 /// Tests that do not look at waiting do not wait.
@@ -126,7 +126,9 @@ async fn before_one_queue(jobs: &[NewJob; 3], is_shared: bool) -> String {
          CREATE TABLE apalis.jobs (job bytea NOT NULL, id text PRIMARY KEY, job_type text NOT NULL, status text NOT NULL,
              lock_by text REFERENCES apalis.workers (id), idempotency_key text);
          CREATE FUNCTION apalis.get_jobs(worker text) RETURNS SETOF apalis.jobs LANGUAGE sql AS $$ SELECT * FROM apalis.jobs $$;
-         INSERT INTO apalis.workers VALUES ('precut-1', 'precut/0.1.0')",
+         INSERT INTO apalis.workers VALUES ('precut-1', 'precut/0.1.0');
+         INSERT INTO precut.studies (study, shard, created_ms) VALUES (decode(repeat('00', 32), 'hex'), 0, 1);
+         INSERT INTO precut.shared_studies (study, created_ms) VALUES (decode(repeat('00', 32), 'hex'), 1)",
     )
     .execute(&pool)
     .await
@@ -212,7 +214,6 @@ impl Place for InDatabase {
 
     async fn silence(&self) {
         self.execute("UPDATE precut.jobs SET heartbeat_ms = heartbeat_ms - 100000").await;
-        self.execute("UPDATE precut.studies SET beat_ms = beat_ms - 100000").await;
     }
 
     async fn later(&self, ms: i64) {
@@ -226,6 +227,17 @@ impl Place for InDatabase {
 
     async fn damage(&self) {
         self.execute("UPDATE precut.results SET version = 4").await;
+        self.execute("UPDATE precut.jobs SET content = substring(content FROM 1 FOR octet_length(content) - 1)").await;
+    }
+
+    async fn abandon(&self, key: Key) {
+        let gone = sqlx::query("DELETE FROM precut.jobs WHERE key = $1").bind(key.as_bytes().as_slice());
+        gone.execute(&self.runtime_pool).await.unwrap();
+    }
+
+    async fn shards(&self) -> i64 {
+        let shards = sqlx::query_scalar("SELECT count(*) FROM precut.jobs WHERE parent IS NOT NULL");
+        shards.fetch_one(&self.runtime_pool).await.unwrap()
     }
 }
 
@@ -352,64 +364,6 @@ shared! {
         }
     }
 
-    async fn parts_of_a_study_are_handed_out_once_and_again_when_their_holder_is_silent() {
-        let place = InDatabase::new().await;
-        let other = place.other().await;
-        let study = key(1);
-        let take = async |store: &PostgresStore| store.take_shard(study, 4).await.unwrap();
-        assert_eq!(take(&place.store).await, Taken::Shard(0));
-        assert_eq!(take(&other).await, Taken::Shard(1));
-        place.store.put_shard(study, 0, "zero".into()).await.unwrap();
-        assert_eq!(take(&place.store).await, Taken::Shard(2));
-        assert_eq!(take(&other).await, Taken::Shard(3));
-        assert_eq!(take(&place.store).await, Taken::NoneLeft);
-        // What is given back is there at once.
-        place.store.give_shard_back(study, 2);
-        let begun = std::time::Instant::now();
-        let again = loop {
-            match take(&other).await {
-                Taken::NoneLeft if begun.elapsed() < Duration::from_mins(1) => {
-                    tokio::time::sleep(Duration::from_millis(20)).await;
-                }
-                taken => break taken,
-            }
-        };
-        assert_eq!(again, Taken::Shard(2));
-        // The other is stopped, its parts are given away, and what it puts down afterwards counts for nothing.
-        let parts = std::mem::take(&mut *other.held_parts());
-        place.silence().await;
-        assert_eq!(take(&place.store).await, Taken::Shard(1));
-        other.held_parts().extend(parts);
-        other.put_shard(study, 1, "late".into()).await.unwrap();
-        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into())]);
-        place.store.put_shard(study, 1, "one".into()).await.unwrap();
-        other.put_shard(study, 1, "later".into()).await.unwrap();
-        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into()), (1, "one".into())]);
-    }
-
-    async fn a_part_of_a_study_is_not_put_down_before_the_results_of_its_points() {
-        let place = InDatabase::new().await;
-        let patience = Patience { points: Duration::from_millis(300), ..AT_ONCE };
-        let hasty = PostgresStore::open(&secret(&place.name), Use { patience, ..usage(place.keep) }).await.unwrap();
-        let study = key(1);
-        assert_eq!(hasty.take_shard(study, 1).await.unwrap(), Taken::Shard(0));
-        let mut hold = place.runtime_pool.begin().await.unwrap();
-        sqlx::query("LOCK TABLE precut.results IN EXCLUSIVE MODE").execute(&mut *hold).await.unwrap();
-        hasty.put(result(1));
-        assert!(matches!(hasty.put_shard(study, 0, "zero".into()).await, Err(StoreError::Failed(_))));
-        assert_eq!(place.store.shards(study).await.unwrap(), []);
-        assert!(hasty.held_parts().contains(&(study, 0)), "it is still in its hands");
-        assert_eq!(place.store.take_shard(study, 1).await.unwrap(), Taken::NoneLeft);
-        hold.rollback().await.unwrap();
-        let begun = std::time::Instant::now();
-        while let Err(error) = hasty.put_shard(study, 0, "zero".into()).await {
-            assert!(begun.elapsed() < Duration::from_mins(1), "{error}");
-        }
-        assert_eq!(place.store.shards(study).await.unwrap(), [(0, "zero".into())]);
-        assert_eq!(place.store.get(result(1).key).await.unwrap(), Some(result(1)));
-        assert!(hasty.held_parts().is_empty());
-    }
-
     async fn jobs_of_an_earlier_version_are_taken_over_when_it_has_no_workers() {
         let place = InDatabase::new().await;
         let newer = Use { engine: "0.2.0".to_owned(), ..usage(place.keep) };
@@ -422,7 +376,7 @@ shared! {
                 Some(claim.jobs[0])
             }
             Next::Nothing => None,
-            other => panic!("{other:?}"),
+            other @ Next::Suspect { .. } => panic!("{other:?}"),
         };
         let both = (next(&place.store).await, next(&newer).await);
         assert_eq!(both, (Some(old), Some(new.id)), "each has a line of its own");
@@ -445,35 +399,6 @@ shared! {
         assert_eq!(next(&place.store).await, None);
         let Next::Run(claim) = take(&new_worker).await else { panic!("both wait") };
         assert!([old, new.id].contains(&claim.jobs[0]));
-    }
-
-    async fn help_is_asked_of_so_many_and_given_where_no_job_of_its_priority_waits() {
-        let place = InDatabase::new().await;
-        let usage = Use { works: true, ..usage(place.keep) };
-        let other = PostgresStore::open(&secret(&place.name), usage).await.unwrap();
-        other.sweep(Arc::new(Vec::new)).await.unwrap();
-        let study = place.accept(job(1)).await;
-        let claim = place.run(study.id).await;
-        assert!(!other.waits(None).await.unwrap());
-        place.store.call_for_help(key(1), 2).await.unwrap();
-        place.accept(NewJob { priority: Priority::Low, ..job(2) }).await;
-        let high = place.accept(NewJob { priority: Priority::High, ..job(3) }).await.id;
-        let Next::Run(first) = take(&other).await else { panic!("it goes first") };
-        assert_eq!(first.jobs, [high]);
-        for _ in 0..2 {
-            let Next::Help(shared) = take(&other).await else { panic!("help is wanted") };
-            assert_eq!((shared.id, shared.key, &shared.input[..]), (study.id, key(1), &b"{\"number\":1}"[..]));
-        }
-        assert!(matches!(take(&other).await, Next::Run(_)), "the low one");
-        // Nobody helps with what is over, nor with what begins anew before it asks again.
-        place.store.call_for_help(key(1), 100).await.unwrap();
-        let wanted = sqlx::query_scalar("SELECT help FROM precut.jobs WHERE id = $1").bind(study.id.to_string());
-        let wanted: i32 = wanted.fetch_one(&place.runtime_pool).await.unwrap();
-        assert_eq!(wanted, 4, "of one worker");
-        place.store.release(claim.lease).await.unwrap();
-        place.run(study.id).await;
-        assert!(!other.waits(None).await.unwrap());
-        assert!(matches!(take(&other).await, Next::Nothing));
     }
 
     async fn nobody_waits_for_who_is_about_to_take_another_job() {

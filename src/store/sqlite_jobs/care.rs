@@ -5,6 +5,7 @@ use sqlx::sqlite::{SqliteConnection, SqlitePool};
 use super::callbacks;
 use super::run::requeue;
 use crate::store::common::jobs::{self, parsed, unwanted};
+use crate::store::common::shards::forget_orphans;
 use crate::store::jobs::{Changed, JobId, Lease, Timing};
 use crate::store::now_ms;
 use crate::store::sql::Outcome;
@@ -89,25 +90,9 @@ pub(super) async fn forget_expired(connection: &mut SqliteConnection, keep_ms: i
         .execute(&mut *connection)
         .await?
         .rows_affected();
-    let parts = forget_deserted_parts(connection, now.saturating_sub(keep_ms)).await?;
-    let most = emptied.max(records).max(parts);
+    forget_orphans(connection).await?;
+    let most = emptied.max(records);
     Ok(Forgotten { records, is_more: most >= u64::from(FORGOTTEN_AT_ONCE) })
-}
-
-/// Parts of studies that were put down before, and that no job waits for.
-async fn forget_deserted_parts(connection: &mut SqliteConnection, before: i64) -> Outcome<u64> {
-    let deserted = sqlx::query(
-        "DELETE FROM studies WHERE (study, shard) IN (
-             SELECT study, shard FROM studies INDEXED BY studies_by_time
-             WHERE created_ms < ?1 AND NOT EXISTS (
-                 SELECT 1 FROM jobs WHERE key = study AND state IN ('queued', 'running'))
-             LIMIT ?2)",
-    )
-    .bind(before)
-    .bind(FORGOTTEN_AT_ONCE)
-    .execute(connection)
-    .await?;
-    Ok(deserted.rows_affected())
 }
 
 pub(super) async fn note_timing(connection: &mut SqliteConnection, timing: &Timing) -> Outcome<()> {

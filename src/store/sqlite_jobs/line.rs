@@ -23,11 +23,12 @@ async fn turn(connection: &mut SqliteConnection, owner: &str, priority: i32, est
             .bind(priority)
             .fetch_one(&mut *connection)
             .await?;
-    let first: Option<i64> =
-        sqlx::query_scalar("SELECT min(turn) FROM jobs WHERE state IN ('queued', 'running') AND priority = ?1")
-            .bind(priority)
-            .fetch_one(&mut *connection)
-            .await?;
+    let first: Option<i64> = sqlx::query_scalar(
+        "SELECT min(turn) FROM jobs WHERE state IN ('queued', 'running') AND priority = ?1 AND parent IS NULL",
+    )
+    .bind(priority)
+    .fetch_one(&mut *connection)
+    .await?;
     Ok(first.map_or(0, |first| first + 1) + own + yields_to(estimate_ms))
 }
 
@@ -73,8 +74,9 @@ pub(super) async fn submit(
         (None, None) => (JobState::Queued, None, 0, None),
     };
     if state == JobState::Queued {
-        let queued: i64 =
-            sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 'queued'").fetch_one(&mut *connection).await?;
+        let queued: i64 = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE state = 'queued' AND parent IS NULL")
+            .fetch_one(&mut *connection)
+            .await?;
         let queued = u64::try_from(queued).unwrap_or(0);
         if queued >= queue_limit {
             return Ok(Accepted::QueueFull { queued });

@@ -14,24 +14,31 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 
 use super::common::callbacks::settle;
-use super::common::jobs::{self, record, set_back};
+use super::common::jobs::{self, finish, record, set_back};
+use super::common::shards;
 use super::common::usage::{forget_work, kept_by_owner, note_work, usage};
 use super::jobs::{
     Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, Next, TakeUp, Timing, Tried, Usage, Wanted,
+    JobStore, Lease, Live, NewJob, Next, Shard, TakeUp, Timing, Tried, Usage, Wanted,
 };
 use super::sql::Reads as _;
 use super::sqlite::SqliteStore;
+use super::writer::POINTS_PATIENCE;
 use super::{StoreError, now_ms};
+use crate::key::Key;
 pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
 use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use run::{beat, cancel, claim, finish, hold, refuse, requeue, take, waits};
+use run::{beat, cancel, claim, hold, refuse, requeue, take, waits};
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
         let keep_ms = self.keep_ms;
+        // What is done is not computed again: without this its points would have no answers.
+        if matches!(ending, Ending::Shard(_)) && !self.writer.flush(POINTS_PATIENCE).await {
+            return Err(StoreError::Failed("the results of a shard's points are not written yet".to_owned()));
+        }
         let ending = Arc::new(packed_ending(ending).await?);
         let written = Arc::clone(&ending);
         let jobs = self
@@ -68,10 +75,10 @@ impl SqliteStore {
 
     async fn count_jobs(&self) -> Result<JobCounts, StoreError> {
         let (queued, running, callbacks, oldest_ms, store_bytes): (i64, i64, i64, Option<i64>, i64) = sqlx::query_as(
-            "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),
-                 (SELECT count(*) FROM jobs WHERE state = 'running'),
+            "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued' AND parent IS NULL),
+                 (SELECT count(*) FROM jobs WHERE state = 'running' AND parent IS NULL),
                  (SELECT count(*) FROM callbacks INDEXED BY callbacks_due WHERE state = 'pending'),
-                 (SELECT created_ms FROM jobs WHERE state = 'queued' ORDER BY id LIMIT 1),
+                 (SELECT created_ms FROM jobs WHERE state = 'queued' AND parent IS NULL ORDER BY id LIMIT 1),
                  (SELECT page_count FROM pragma_page_count) * (SELECT page_size FROM pragma_page_size)",
         )
         .fetch_one(&self.readers)
@@ -119,6 +126,18 @@ impl JobStore for SqliteStore {
     }
     fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(self.finish_job(lease, ending))
+    }
+    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(self.ledger.write(move |connection| {
+            let numbers = numbers.clone();
+            Box::pin(async move { shards::add(connection, lease, &numbers, "").await })
+        }))
+    }
+    fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>> {
+        Box::pin(async move { Ok(shards::over(&mut *self.reader().await?, parent, &numbers).await?) })
+    }
+    fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>> {
+        Box::pin(async move { Ok(shards::input_of(&mut *self.reader().await?, key).await?) })
     }
     fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
         Box::pin(

@@ -32,6 +32,15 @@ pub(in crate::store) async fn packed(job: NewJob) -> Result<Packed, StoreError> 
 pub(in crate::store) async fn packed_ending(ending: Ending) -> Result<PackedEnding, StoreError> {
     match ending {
         Ending::Failed(problem) => Ok(PackedEnding::Failed(problem)),
+        Ending::Shard(content) => {
+            let pack = move || {
+                let mut packer = zstd::bulk::Compressor::new(LEVEL)?;
+                // What is damaged is not taken for what the shard came to.
+                packer.include_checksum(true)?;
+                packer.compress(&content)
+            };
+            blocking(0, pack).await.map(PackedEnding::Shard)
+        }
         Ending::Succeeded(result) => {
             let size = result.body.len() + result.input.len();
             blocking(size, move || Packer::new()?.row(&result)).await.map(PackedEnding::Succeeded)
@@ -41,6 +50,7 @@ pub(in crate::store) async fn packed_ending(ending: Ending) -> Result<PackedEndi
 
 pub(in crate::store) enum PackedEnding {
     Succeeded(ResultRow),
+    Shard(Vec<u8>),
     Failed(String),
 }
 
@@ -49,7 +59,7 @@ impl PackedEnding {
     pub(in crate::store) fn key(&self) -> Option<Key> {
         match self {
             Self::Succeeded(result) => Key::from_bytes(&result.key),
-            Self::Failed(_) => None,
+            Self::Shard(_) | Self::Failed(_) => None,
         }
     }
 }

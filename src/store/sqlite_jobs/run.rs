@@ -2,11 +2,7 @@
 
 use sqlx::sqlite::SqliteConnection;
 
-use super::pack::PackedEnding;
-use crate::store::common::jobs::{
-    Runnable, end, fail_of_owner, ids, parsed, put_back, record, result_of, set_cancelled, unwanted,
-};
-use crate::store::common::results::insert;
+use crate::store::common::jobs::{Runnable, fail_of_owner, ids, parsed, put_back, record, set_cancelled, unwanted};
 use crate::store::jobs::{Beat, Cancelled, Claim, Claimed, JobId, Lease, MOST_ATTEMPTS, Next, SILENCE, Wanted};
 use crate::store::sql::Outcome;
 
@@ -14,19 +10,21 @@ use crate::store::sql::Outcome;
 macro_rules! runnable {
     ($condition:expr) => {
         concat!(
-            "SELECT id, key, state, kind, calculator, attempt, input, priority, turn, owner, created_ms, traceparent, tracestate \
-             FROM jobs WHERE ",
+            "SELECT id, key, state, kind, calculator, attempt, input, priority, turn, owner, created_ms, traceparent, tracestate, \
+                 parent, shard FROM jobs WHERE ",
             $condition
         )
     };
 }
 
 /// What waits and may be taken: `?1` is now, `?2` how long others keep away from what is held (a clock that was set back
-/// holds nothing for longer), `?3` the longest job.
+/// holds nothing for longer), `?3` the longest job, which is no shard.
 macro_rules! in_line {
     () => {
         "state = 'queued' AND (heartbeat_ms IS NULL OR abs(?1 - heartbeat_ms) >= ?2) \
-         AND (?3 IS NULL OR (estimate_ms <= ?3 AND attempt = 0))"
+         AND (?3 IS NULL OR (estimate_ms <= ?3 AND attempt = 0 AND parent IS NULL)) \
+         AND (parent IS NULL OR EXISTS ( \
+             SELECT 1 FROM jobs AS whole WHERE whole.key = jobs.parent AND whole.state = 'running'))"
     };
 }
 
@@ -68,7 +66,7 @@ pub(super) async fn take(connection: &mut SqliteConnection, wanted: Wanted, now:
     if charged + 1 >= MOST_ATTEMPTS {
         let id = parsed(&next.id)?;
         hold(connection, id, now).await?;
-        return Ok(Next::Suspect { id, calculator: next.calculator });
+        return Ok(Next::Suspect { id, is_shard: next.is_shard(), calculator: next.calculator });
     }
     start(connection, next, wanted.lease, charged, now).await.map(Next::Run)
 }
@@ -130,7 +128,7 @@ async fn start(
     lease: Lease,
     charged: u32,
     now: i64,
-) -> Outcome<Claim> {
+) -> Outcome<Box<Claim>> {
     let jobs: Vec<String> = sqlx::query_scalar(
         "UPDATE jobs
          SET state = 'running', attempt = ?2, lease = ?3, heartbeat_ms = ?4, started_ms = ?4, progress = 0.0, stage = NULL
@@ -143,28 +141,15 @@ async fn start(
     .fetch_all(&mut *connection)
     .await?;
     // The line has come to this place, however long others run that were taken before: who comes now begins behind it.
-    sqlx::query("UPDATE jobs SET turn = ?1 WHERE state = 'running' AND priority = ?2 AND turn < ?1")
-        .bind(next.turn)
-        .bind(next.priority)
-        .execute(connection)
-        .await?;
+    if !next.is_shard() {
+        sqlx::query("UPDATE jobs SET turn = ?1 WHERE state = 'running' AND priority = ?2 AND turn < ?1")
+            .bind(next.turn)
+            .bind(next.priority)
+            .execute(connection)
+            .await?;
+    }
     next.attempt = charged + 1;
     next.claim(lease, ids(&jobs)?)
-}
-
-pub(super) async fn finish(
-    connection: &mut SqliteConnection,
-    lease: Lease,
-    ending: &PackedEnding,
-    (now, keep_ms): (i64, i64),
-) -> Outcome<Vec<JobId>> {
-    let ended = end(connection, lease, ending, (now, keep_ms)).await?;
-    if let Some(result) = result_of(ending)
-        && !ended.is_empty()
-    {
-        insert(connection, std::slice::from_ref(result), now).await?;
-    }
-    Ok(ended)
 }
 
 /// Puts the running jobs of some leases back in line, see [`put_back`].

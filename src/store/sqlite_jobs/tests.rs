@@ -68,7 +68,22 @@ impl Place for InFile {
     }
 
     async fn damage(&self) {
-        sqlx::query("UPDATE results SET version = 4").execute(&self.pool().await).await.unwrap();
+        let pool = self.pool().await;
+        for damage in
+            ["UPDATE results SET version = 4", "UPDATE jobs SET content = substr(content, 1, length(content) - 1)"]
+        {
+            sqlx::query(damage).execute(&pool).await.unwrap();
+        }
+    }
+
+    async fn abandon(&self, key: Key) {
+        let gone = sqlx::query("DELETE FROM jobs WHERE key = ?1").bind(key.as_bytes().as_slice());
+        gone.execute(&self.pool().await).await.unwrap();
+    }
+
+    async fn shards(&self) -> i64 {
+        let shards = sqlx::query_scalar("SELECT count(*) FROM jobs WHERE parent IS NOT NULL");
+        shards.fetch_one(&self.pool().await).await.unwrap()
     }
 }
 
@@ -162,7 +177,8 @@ async fn jobs_that_waited_in_the_queue_of_earlier_programs_are_lost_nowhere() {
          CREATE UNIQUE INDEX idx_jobs_idempotency_key ON Jobs (job_type, idempotency_key);
          INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
              VALUES (20220530084123, 'jobs workers', 1, x'00', 0), (20260804103122, 'drop', 1, x'00', 0);
-         INSERT INTO Workers VALUES ('precut-1', 'precut')",
+         INSERT INTO Workers VALUES ('precut-1', 'precut');
+         INSERT INTO studies VALUES (zeroblob(32), 0, x'00', zeroblob(32), 1)",
     )
     .execute(&pool)
     .await
@@ -203,7 +219,7 @@ async fn jobs_that_waited_in_the_queue_of_earlier_programs_are_lost_nowhere() {
         InFile { store: SqliteStore::open(folder.path(), keep(Duration::from_hours(1))).await.unwrap(), folder };
     assert_eq!(place.line().await, jobs.each_ref().map(|job| job.id));
     let left: Vec<String> = sqlx::query_scalar(
-        "SELECT name FROM sqlite_master WHERE tbl_name IN ('Jobs', 'Workers')
+        "SELECT name FROM sqlite_master WHERE tbl_name IN ('Jobs', 'Workers', 'studies')
          UNION ALL SELECT CAST(version AS TEXT) FROM _sqlx_migrations WHERE version > 1000000",
     )
     .fetch_all(&place.store.readers)

@@ -6,6 +6,7 @@ pub(in crate::store) mod documents;
 pub(in crate::store) mod jobs;
 pub(in crate::store) mod processes;
 pub(in crate::store) mod results;
+pub(in crate::store) mod shards;
 
 use std::time::Duration;
 
@@ -32,8 +33,12 @@ pub(in crate::store) trait Place: Sized {
     async fn silence(&self);
     /// Everything that is on record happened so much earlier, ms.
     async fn later(&self, ms: i64);
-    /// Changes the rows of kept results.
+    /// Changes the rows of kept results, and of shards that are done.
     async fn damage(&self);
+    /// Takes the jobs of a key away, and leaves their shards.
+    async fn abandon(&self, key: Key);
+    /// The shards that are on record.
+    async fn shards(&self) -> i64;
 
     async fn new() -> Self {
         Self::with(keep(Duration::from_hours(1))).await
@@ -65,7 +70,7 @@ pub(in crate::store) trait Place: Sized {
 
     async fn run(&self, id: JobId) -> Claim {
         match self.claim(id).await {
-            Claimed::Run(claim) => claim,
+            Claimed::Run(claim) => *claim,
             other => panic!("{other:?}"),
         }
     }
@@ -151,6 +156,15 @@ macro_rules! suite {
             what_was_charged_too_often_is_kept_for_who_runs_it_alone
             a_job_that_may_not_begin_fails_and_its_equals_wait_again
         }
+        suite! { $place, shards:
+            shards_are_claimed_and_end_as_jobs_and_go_with_their_parent
+            one_shard_has_the_turn_of_its_parent_and_the_others_let_all_jobs_pass
+            who_has_lost_a_shard_or_its_parent_cannot_write
+            shards_are_in_no_list_and_no_quota
+            shards_stay_as_long_as_an_equal_job_wants_them
+            a_parent_that_gets_on_is_not_charged_for_it
+            a_shard_is_over_only_with_the_results_of_its_points
+        }
         suite! { $place, callbacks:
             a_callback_is_due_when_its_job_is_over_however_it_ends
             a_callback_is_one_process_at_a_time_and_over_once_it_is_settled
@@ -178,8 +192,6 @@ macro_rules! suite {
             the_total_stays_below_the_limit_and_the_last_used_stay
             what_is_old_is_forgotten_at_the_next_start
             the_jobs_of_some_results_are_read_at_once
-            parts_of_a_study_are_put_down_and_forgotten
-            parts_of_a_study_that_no_job_waits_for_go_in_time
         }
     };
     ($place:ty, $part:ident: $($test:ident)+) => {

@@ -1,4 +1,4 @@
-//! What every store has to do with results and parts of studies.
+//! What every store has to do with results.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -193,36 +193,4 @@ pub(in crate::store) async fn the_jobs_of_some_results_are_read_at_once<P: Place
     assert_eq!(read, [(keys[2], jobs[0].into()), (keys[0], jobs[2].into())]);
     assert_eq!(place.store().inputs(keys, 5).await.unwrap(), [], "larger ones are left out");
     assert_eq!(place.store().inputs(Vec::new(), 1000).await.unwrap(), []);
-}
-
-pub(in crate::store) async fn parts_of_a_study_are_put_down_and_forgotten<P: Place>() {
-    let place = P::new().await;
-    let (study, other) = (super::key(1), super::key(2));
-    for (study, shard) in [(study, 3), (study, 0), (other, 1)] {
-        place.store().put_shard(study, shard, format!("part {shard}").into()).await.unwrap();
-    }
-    let expected = vec![(0, "part 0".into()), (3, "part 3".into())];
-    assert_eq!(place.store().shards(study).await.unwrap(), expected);
-    assert_eq!(place.store().some_shards(study, vec![1, 2, 3]).await.unwrap(), expected[1..]);
-    let place = place.again().await;
-    assert_eq!(place.store().shards(study).await.unwrap(), expected);
-    place.store().forget_shards(study).await.unwrap();
-    assert_eq!(place.store().shards(study).await.unwrap(), []);
-    assert_eq!(place.store().shards(other).await.unwrap().len(), 1);
-}
-
-pub(in crate::store) async fn parts_of_a_study_that_no_job_waits_for_go_in_time<P: Place>() {
-    let place = P::new().await;
-    let (deserted, wanted) = (super::key(1), super::key(2));
-    for study in [deserted, wanted] {
-        place.store().put_shard(study, 0, "part".into()).await.unwrap();
-    }
-    place.accept(super::job(2)).await;
-    place.store().forget_expired().await.unwrap();
-    assert_eq!(place.store().shards(deserted).await.unwrap().len(), 1, "somebody may ask for it again");
-    let place = place.again_with(keep(Duration::from_millis(1))).await;
-    tokio::time::sleep(Duration::from_millis(5)).await;
-    place.store().forget_expired().await.unwrap();
-    assert_eq!(place.store().shards(deserted).await.unwrap(), []);
-    assert_eq!(place.store().shards(wanted).await.unwrap().len(), 1);
 }
