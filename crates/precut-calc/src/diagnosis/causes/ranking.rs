@@ -109,6 +109,37 @@ impl Ranking {
         Ok(())
     }
 
+    /// Begins the parts of the set that leads once more from where it has its best optimum. A companion that has nothing to do there
+    /// would keep its place if its partner alone were only known at another one.
+    pub(in crate::diagnosis) fn refine_parts_from_leader(
+        &mut self,
+        refinement: &Refinement<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let mut tried: Vec<Vec<usize>> = Vec::new();
+        while let Some(leader) = self.candidates.iter().find(|candidate| !candidate.members.is_empty()) {
+            let Some(fit) = self.fit(&leader.members).filter(|_| !tried.contains(&leader.members)) else { break };
+            let (leader, settings, with_shapes) = (leader.members.clone(), fit.settings.clone(), fit.with_shapes);
+            let is_part = |members: &[usize]| {
+                (1..leader.len()).contains(&members.len()) && members.iter().all(|member| leader.contains(member))
+            };
+            for candidate in self.candidates.iter_mut().filter(|candidate| is_part(&candidate.members)) {
+                checkpoint(monitor)?;
+                let own = self.fits.iter_mut().find(|(of, _)| *of == candidate.members);
+                let Some(fit) = own.and_then(|(_, fit)| fit.as_mut()) else { continue };
+                let of_part = |setting: &&Setting| candidate.members.contains(&setting.hypothesis);
+                let there: Vec<Setting> = settings.iter().filter(of_part).cloned().collect();
+                let start = Start { about: there.clone(), settings: there };
+                if let Some(found) = refinement.fit(start, with_shapes)?.filter(|found| found.settled) {
+                    take_if_better(candidate, fit, found);
+                }
+            }
+            by_weight(&mut self.candidates);
+            tried.push(leader);
+        }
+        Ok(())
+    }
+
     /// Refines pairs of which a member has no size, a floor for instance: what such a cause does beside another is not the sum
     /// of what both do alone, as the search takes it to be.
     pub(in crate::diagnosis) fn refine_beside_sizeless(

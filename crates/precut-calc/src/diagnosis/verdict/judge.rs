@@ -30,6 +30,9 @@ pub(in crate::diagnosis) const UNNAMED_MATTERS: f64 = ALARM;
 /// it is. Two of forty shafts with nothing hidden are rejected at the level itself.
 const SHARE_OF_LEVEL: f64 = 1e-3;
 
+/// Sets by their members, and the probability that classes drawn from what each foresees look as odd as those seen.
+pub(super) type FitsOfClasses = Vec<(Vec<usize>, Option<f64>)>;
+
 /// What the rows say.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
@@ -54,11 +57,7 @@ impl Weighing<'_> {
     }
 
     /// The likely sets against classes that are drawn from what each foresees.
-    pub(super) fn tested_on_classes(
-        &self,
-        sides: &[f64],
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<(Vec<usize>, Option<f64>)>, Failure> {
+    pub(super) fn tested_on_classes(&self, sides: &[f64], monitor: &dyn Monitor) -> Result<FitsOfClasses, Failure> {
         let of_set = |set: &&SetWeight| {
             let margins = self.margins(set);
             let fit = margins.map(|margins| fit_of_classes(self, margins, sides, monitor)).transpose()?;

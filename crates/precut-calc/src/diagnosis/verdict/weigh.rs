@@ -15,7 +15,7 @@ use crate::diagnosis::statistics::whiten::{White, Whitener};
 use crate::diagnosis::verdict::adequacy::{Test, adequacy};
 use crate::diagnosis::verdict::effort::{Effort, OtherOptima};
 use crate::diagnosis::verdict::foundation::Foundation;
-use crate::diagnosis::verdict::judge::Verdict;
+use crate::diagnosis::verdict::judge::{FitsOfClasses, Verdict};
 
 /// A set whose evidence is below that of the leader by no more than this may lead from another of its optima.
 const NEAR: f64 = 2.0;
@@ -53,8 +53,8 @@ pub struct Weighing<'a> {
     pub inclusion: Vec<f64>,
     /// Tests of the base.
     pub tests: Vec<Test>,
-    /// Of classes: the likely sets by their members, and the probability that what they foresee looks as odd as what was seen.
-    pub(super) fits_of_classes: Vec<(Vec<usize>, Option<f64>)>,
+    /// Of classes, of the likely sets.
+    pub(super) fits_of_classes: FitsOfClasses,
     /// The verdict.
     pub verdict: Verdict,
 }
@@ -101,6 +101,7 @@ impl<'a> Weighing<'a> {
                 set.members.len() > 1 && (set.log_z > leads - NEAR || heaviest.contains(&set.members))
             };
             ranking.look_elsewhere_of(is_near, &linear, &refinement, monitor)?;
+            ranking.refine_parts_from_leader(&refinement, monitor)?;
         }
         if effort.other_optima != OtherOptima::None {
             ranking.look_elsewhere(&linear, &refinement)?;
