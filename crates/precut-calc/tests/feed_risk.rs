@@ -9,24 +9,26 @@ use precut_calc::feed_schedule::fit::{FitJob, MachinabilityFit};
 use precut_calc::feed_schedule::{FeedSchedule, Job};
 use serde_json::{Value, json};
 
-fn case(name: &str) -> Value {
+pub(crate) fn case(name: &str) -> Value {
     let path = format!("{}/reference/certainty/{name}.json", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-fn answered(job: &Value) -> Result<precut_calc::calculator::Answer<precut_calc::feed_schedule::Outcome>, Failure> {
+pub(crate) fn answered(
+    job: &Value,
+) -> Result<precut_calc::calculator::Answer<precut_calc::feed_schedule::Outcome>, Failure> {
     FeedSchedule::run(&feed_support::job(job.clone()), &Unwatched)
 }
 
-fn solved(job: &Value) -> Value {
+pub(crate) fn solved(job: &Value) -> Value {
     serde_json::to_value(answered(job).unwrap().output).unwrap()
 }
 
-fn number(value: &Value, pointer: &str) -> f64 {
+pub(crate) fn number(value: &Value, pointer: &str) -> f64 {
     value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer} in {value}"))
 }
 
-fn near(name: &str, found: f64, expected: f64, relative: f64) {
+pub(crate) fn near(name: &str, found: f64, expected: f64, relative: f64) {
     assert!((found / expected - 1.0).abs() <= relative, "{name}: {found}, expected {expected}");
 }
 
@@ -195,7 +197,7 @@ fn what_is_asked_of_single_risks_in_vain_is_told() {
 }
 
 /// A standard normal number.
-fn normal(draw: &mut Draw) -> f64 {
+pub(crate) fn normal(draw: &mut Draw) -> f64 {
     let share = draw.share().clamp(1e-12, 1.0 - 1e-12);
     -std::f64::consts::SQRT_2 * statrs::function::erf::erfc_inv(2.0 * share)
 }

@@ -60,6 +60,7 @@ mod feed_depths;
 mod feed_diagnosis;
 mod feed_diagnosis_trials;
 mod feed_effects;
+mod feed_open_effects;
 mod feed_program;
 mod feed_properties;
 mod feed_reference;

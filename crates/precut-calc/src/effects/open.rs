@@ -67,6 +67,12 @@ impl Catalogued for super::FixtureEffect {
     }
 }
 
+impl Catalogued for super::MachinabilityEffect {
+    fn entry(&self) -> &'static Cause {
+        self.cause()
+    }
+}
+
 impl Catalogued for super::MillingEffect {
     fn entry(&self) -> &'static Cause {
         self.cause()

@@ -29,6 +29,7 @@ pub use job::input::{
     UsageScope, Variables, Zone,
 };
 pub use job::models::{FurtherModel, Models, Output};
+pub use job::open::ScheduleUncertainty;
 pub use job::plan::{Compensation, EqualTarget, Method, PassPlan, TradeOff, TradedLimit};
 pub use measured::forward::{MachinabilityAllowances, MachinabilityPoint, MachinabilityRun};
 pub use measured::measurement::MachinabilityMeasurement;
@@ -39,6 +40,7 @@ use crate::calculator::{
     Answer, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Meta, Monitor, Place, Program,
     ProgramOrigin, Table,
 };
+use crate::certainty::open;
 use crate::shaft::places;
 use crate::{force, shaft};
 
@@ -67,7 +69,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \
@@ -212,6 +214,7 @@ const CODES: Codes = Codes {
         job::check::CODES,
         model::risk::CODES,
         job::effects::CODES,
+        open::CODES,
         measured::forward::CODES,
         shaft::check::CODES,
         force::FAULT_CODES,

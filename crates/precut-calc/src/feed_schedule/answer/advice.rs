@@ -339,6 +339,9 @@ fn limits_kept(job: &Job, outcome: &Outcome) -> Option<Message> {
     if let Some(joint) = conformance.joint_probability {
         said = said.with("joint_percent", 100.0 * joint);
     }
+    if job.uncertainty.is_open() {
+        said = said.with("open", "yes");
+    }
     if let Some(found) = conformance.risk_percent.filter(|found| !risk::is_at_an_end(*found)) {
         said = said.with("found_percent", found);
     }

@@ -63,7 +63,7 @@ pub(in crate::feed_schedule) fn run(job: &Job, monitor: &dyn Monitor) -> Result<
     }
     let mut outcome = outcome(job, &found, zones);
     edges::recount(&found.case, &mut outcome);
-    outcome.conformance = scatter::conformance(job, &found.case, &outcome);
+    outcome.conformance = scatter::conformance(job, &found.case, &outcome)?;
     if let Some(conformance) = &mut outcome.conformance {
         conformance.gain_percent_per_percent_of_risk = found.worth_of_risk;
         conformance.risk_percent = job.risk.of_part().filter(|_| is_found).map(|risk| 100.0 * risk);

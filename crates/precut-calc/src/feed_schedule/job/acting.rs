@@ -258,6 +258,21 @@ impl ActingModel {
         if self.base.log_log { value.exp() } else { value }
     }
 
+    /// What is between this model and another of the same output: products with 1, ln V, ln S. `None` where that bends.
+    pub(in crate::feed_schedule) fn straight_from(&self, other: &Self) -> Option<[f64; 3]> {
+        // What is joined to the rest of the model, or added to its exponential, bends what moves beneath it.
+        let is_plain = |model: &Self| model.floor.is_none() && (model.offset == 0.0 || !model.base.log_log);
+        let bends_alike = self.quadratic.iter().zip(&other.quadratic).all(|(a, b)| (a - b).abs() <= 0.0)
+            && self.hump == other.hump
+            && self.tables == other.tables
+            && self.formulas == other.formulas;
+        let (own, base) = (self.base, other.base);
+        (is_plain(self) && is_plain(other) && bends_alike).then(|| {
+            let constant = own.constant + self.offset - base.constant - other.offset;
+            [constant, own.speed - base.speed, own.feed - base.feed]
+        })
+    }
+
     /// How it bends.
     pub(in crate::feed_schedule) fn bends(&self) -> Bend {
         let [q_uu, q_xx, q_ux] = self.quadratic;

@@ -1,5 +1,7 @@
 //! A job in the numbers that the program needs: zones with compliances and acting models, limits, what is least.
 
+use std::sync::Arc;
+
 use crate::calculator::Failure;
 use crate::effects::MachinabilityEffect;
 use crate::force::Component;
@@ -9,6 +11,7 @@ use crate::feed_schedule::job::acting::{ActingModel, Bend, Form};
 use crate::feed_schedule::job::compliance::Held;
 use crate::feed_schedule::job::input::{Goal, Job, Limits, Machine, Reference, UsageScope, Variables, Zone};
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::open::OpenModels;
 use crate::feed_schedule::job::scatter::{OUTPUT_LIMITS, Scatter};
 use crate::feed_schedule::model::risk;
 
@@ -31,6 +34,8 @@ pub(in crate::feed_schedule) struct Case {
     pub edge_margin: f64,
     /// What edges that are worn out before they are changed cost on average, money per edge.
     pub edge_failures_cost: f64,
+    /// The models as they may be by what is not known of the effects.
+    pub open: Arc<OpenModels>,
 }
 
 /// A zone, or one of its passes.
@@ -74,7 +79,7 @@ pub(in crate::feed_schedule) struct ZoneCase {
 }
 
 /// By how much a limit on an output is moved in: so many standard deviations of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(in crate::feed_schedule) struct Margin {
     deviations: f64,
     scatter: Option<Scatter>,
@@ -86,13 +91,18 @@ impl Margin {
     }
 
     pub(in crate::feed_schedule) fn bends(&self) -> bool {
-        self.scatter.is_some_and(|scatter| scatter.bends())
+        self.scatter.as_ref().is_some_and(Scatter::bends)
     }
 
-    /// The tangent at ln V, ln S: its constant and what it has by them. Upward of it lies nothing but the margin itself, which is
-    /// convex where it moves a limit in.
+    /// Whether it may bend either way.
+    pub(in crate::feed_schedule) fn is_mixed(&self) -> bool {
+        self.scatter.as_ref().is_some_and(Scatter::is_mixed)
+    }
+
+    /// The tangent at ln V, ln S: its constant and what it has by them. Unless it is mixed, upward of it lies nothing but the margin itself,
+    /// which is convex where it moves a limit in.
     pub(in crate::feed_schedule) fn form(&self, u: f64, x: f64) -> [f64; 3] {
-        let Some(scatter) = self.scatter else { return [0.0; 3] };
+        let Some(scatter) = &self.scatter else { return [0.0; 3] };
         let (deviation, [by_u, by_x]) = scatter.deviation(u, x);
         [deviation - by_u * u - by_x * x, by_u, by_x].map(|part| self.deviations * part)
     }
@@ -148,7 +158,10 @@ impl ZoneCase {
 
     /// By how much a limit is moved in.
     pub(in crate::feed_schedule) fn margin(&self, limit: &str) -> Margin {
-        OUTPUT_LIMITS.iter().position(|one| one.name == limit).map_or(Margin::default(), |place| self.margins[place])
+        OUTPUT_LIMITS
+            .iter()
+            .position(|one| one.name == limit)
+            .map_or_else(Margin::default, |place| self.margins[place].clone())
     }
 
     /// Compliance that bends, um/N; `None` where there is none to speak of.
@@ -174,18 +187,20 @@ impl<'a> Resolver<'a> {
 
     /// The acting models of the known outputs at a depth.
     pub(in crate::feed_schedule) fn models(&self, depth_mm: f64) -> [Option<ActingModel>; 6] {
-        Output::ALL.map(|output| {
-            self.job.models.at_depth(output, self.job.force.as_ref(), depth_mm).map(|model| {
-                ActingModel::of(
-                    &model,
-                    self.effects(output.name()),
-                    &self.job.conditions,
-                    &self.reference,
-                    depth_mm,
-                    self.job.cutting_edge_angle_deg,
-                )
-            })
-        })
+        Output::ALL.map(|output| self.model(&self.job.effects, output, depth_mm))
+    }
+
+    /// That of one of them with these effects.
+    pub(in crate::feed_schedule) fn model(
+        &self,
+        effects: &[MachinabilityEffect],
+        output: Output,
+        depth_mm: f64,
+    ) -> Option<ActingModel> {
+        let model = self.job.models.at_depth(output, self.job.force.as_ref(), depth_mm)?;
+        let own = effects.iter().filter(|effect| effect.output() == Some(output.name()));
+        let angle_deg = self.job.cutting_edge_angle_deg;
+        Some(ActingModel::of(&model, own, &self.job.conditions, &self.reference, depth_mm, angle_deg))
     }
 
     /// The acting models of the further outputs at a depth.
@@ -244,7 +259,7 @@ impl<'a> Resolver<'a> {
             hardening_depth_max_um: zone.hardening_depth_max_um,
             feed_max_mm_per_rev: zone.feed_max_mm_per_rev.map_or(general, |own| own.min(general)),
             ceiling: None,
-            margins: [Margin::default(); OUTPUT_LIMITS.len()],
+            margins: std::array::from_fn(|_| Margin::default()),
             touches_next: next.is_some_and(|next| (next.z_start_mm - zone.z_end_mm).abs() <= TOUCHING_MM),
             force_depth_exponent: self.depth_exponent(depth_mm),
             models: self.models(depth_mm),
@@ -322,6 +337,7 @@ impl Case {
             passes_time_min: 0.0,
             edge_margin: 0.0,
             edge_failures_cost: job.risk.cost_per_edge(),
+            open: Arc::new(OpenModels::of(job)?),
         };
         if let (Some(split), Some(plan)) = (split, &job.passes) {
             case.passes_time_min =

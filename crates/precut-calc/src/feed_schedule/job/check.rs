@@ -1,6 +1,7 @@
 //! Rules between fields. What one field alone may hold stands in its schema.
 
 use crate::calculator::{Check, Finding, Violations};
+use crate::certainty::open;
 use crate::machinability::{self, CoefficientCovariance, MachinabilityModel, ModelCoefficient, ModelForm};
 use crate::shaft::{self, Support};
 
@@ -50,6 +51,7 @@ impl Check for Job {
         check_shaft(self, violations);
         check_models(self, violations);
         effects::check(self, violations);
+        open::check(&self.effects, &self.uncertainty.effects, violations);
         if let Some(force) = &self.force {
             force.check("/force", violations);
         }

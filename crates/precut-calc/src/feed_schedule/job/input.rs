@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::deflection_compensation::ProgramSettings;
 use crate::effects::{MachinabilityConditions, MachinabilityEffect};
 use crate::feed_schedule::job::models::Models;
+use crate::feed_schedule::job::open::ScheduleUncertainty;
 use crate::feed_schedule::job::plan::{Compensation, Method, PassPlan, TradeOff};
 use crate::feed_schedule::model::risk::Risk;
 use crate::force::ForceModel;
@@ -114,6 +115,10 @@ pub struct Job {
     #[serde(default)]
     #[schema(max_items = 60, extensions(("x-group" = json!("effects"))))]
     pub effects: Vec<MachinabilityEffect>,
+    /// What is not known of the effects.
+    #[serde(default, skip_serializing_if = "ScheduleUncertainty::is_empty")]
+    #[schema(extensions(("x-group" = json!("effects")), ("x-advanced" = json!(true))))]
+    pub uncertainty: ScheduleUncertainty,
     /// The state that effects depend on.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("effects"))))]

@@ -1,9 +1,11 @@
 //! Limits on outputs that scatter: with which probability the parts, and the edges, keep them (`feed/10.1`, `certainty/5`).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{Continuous, ContinuousCDF, StudentsT};
 
-use crate::calculator::Finding;
+use crate::calculator::{Failure, Finding};
 use crate::certainty::lines::points;
 use crate::certainty::{bounded, normal_quantile};
 use crate::machinability::ModelForm;
@@ -13,13 +15,15 @@ use crate::feed_schedule::answer::output::{Outcome, ScheduleConformance, Schedul
 use crate::feed_schedule::job::case::{Case, ZoneCase};
 use crate::feed_schedule::job::input::Job;
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::open::{Given, Move, MovedResults, OpenModels};
 
 /// A share below this is not told.
 const LEAST_SHARE: f64 = 0.01;
 /// A share that was asked for may be passed by this, relative: what a schedule is solved to.
 const SOLVED: f64 = 1e-3;
-/// Points over which coefficients that are uncertain are integrated, and their seed.
+/// Points over which coefficients that are uncertain are integrated, and effects; fewer where every one takes models anew. Their seed.
 const POINTS: usize = 4096;
+const POINTS_BENT: usize = 1024;
 const SEED: u32 = 1;
 
 type Of = fn(&ZoneOutcome) -> Option<f64>;
@@ -79,12 +83,14 @@ pub(in crate::feed_schedule) const OUTPUT_LIMITS: [OutputLimit; 6] = [
 ];
 
 /// How single results scatter about a model at one depth: about it, and with it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(in crate::feed_schedule) struct Scatter {
     /// s: about it.
     residual: f64,
-    /// The variance that the coefficients bring, as a quadratic form in 1, ln V, ln S.
+    /// The variance that the coefficients bring, and effects whose numbers are not known, as a quadratic form in 1, ln V, ln S.
     coefficients: Option<[[f64; 3]; 3]>,
+    /// What else effects move, which bends over ln V, ln S.
+    bent: Arc<[Move]>,
     /// Student's degrees of freedom, where they are stated.
     degrees: Option<f64>,
     log_log: bool,
@@ -93,16 +99,28 @@ pub(in crate::feed_schedule) struct Scatter {
 impl Scatter {
     /// Whether it changes with speed and feed.
     pub(in crate::feed_schedule) fn bends(&self) -> bool {
-        self.coefficients.is_some()
+        self.coefficients.is_some() || self.is_mixed()
+    }
+
+    /// Whether that may bend either way; what goes by 1, ln V, ln S alone bends upward.
+    pub(in crate::feed_schedule) fn is_mixed(&self) -> bool {
+        !self.bent.is_empty()
     }
 
     /// sigma(ln V, ln S) and its slopes (`certainty/5.1`).
     pub(in crate::feed_schedule) fn deviation(&self, u: f64, x: f64) -> (f64, [f64; 2]) {
-        let Some(q) = self.coefficients else { return (self.residual, [0.0; 2]) };
-        let by = q.map(|row| row[0] + row[1] * u + row[2] * x);
-        let deviation = (self.residual * self.residual + by[0] + by[1] * u + by[2] * x).max(0.0).sqrt();
-        let slope = |k: usize| if deviation > 0.0 { by[k] / deviation } else { 0.0 };
-        (deviation, [slope(1), slope(2)])
+        if !self.bends() {
+            return (self.residual, [0.0; 2]);
+        }
+        let by = self.coefficients.unwrap_or_default().map(|row| row[0] + row[1] * u + row[2] * x);
+        let mut variance = self.residual * self.residual + by[0] + by[1] * u + by[2] * x;
+        let mut slopes = [by[1], by[2]];
+        for (own, by) in self.bent.iter().map(|one| one.at(u, x)) {
+            variance += own * own;
+            slopes.iter_mut().zip(by).for_each(|(slope, by)| *slope += own * by);
+        }
+        let deviation = variance.max(0.0).sqrt();
+        (deviation, slopes.map(|slope| if deviation > 0.0 { slope / deviation } else { 0.0 }))
     }
 
     /// How many deviations lie between what is expected and a limit that is passed with this probability.
@@ -132,26 +150,46 @@ impl Scatter {
     }
 }
 
-/// How results scatter about an output's model at a depth; `None` where neither scatter nor covariance is stated.
-pub(in crate::feed_schedule) fn scatter(job: &Job, output: Output, depth_mm: f64) -> Option<Scatter> {
-    let model = job.models.get(output)?;
-    let coefficients = model.coefficient_covariance.as_ref().and_then(|covariance| {
+/// How results scatter about an output's model at a depth; `None` where neither scatter nor covariance is stated, and nothing that moves
+/// it is left open of effects.
+pub(in crate::feed_schedule) fn scatter(
+    job: &Job,
+    open: &OpenModels,
+    output: Output,
+    depth_mm: f64,
+) -> Option<Scatter> {
+    let model = job.models.get(output);
+    let of_fit = model.and_then(|model| model.coefficient_covariance.as_ref());
+    let mut coefficients = of_fit.and_then(|covariance| {
         let matrix = covariance.as_matrix()?;
         let factors = covariance.factors(depth_mm, job.cutting_edge_angle_deg);
         let mut form = [[0.0; 3]; 3];
         for (i, by) in factors.iter().enumerate() {
             for (j, with) in factors.iter().enumerate() {
-                for (row, a) in form.iter_mut().zip(by) {
-                    row.iter_mut().zip(with).for_each(|(entry, b)| *entry += a * matrix[(i, j)] * b);
-                }
+                add_product(&mut form, (by, with), matrix[(i, j)]);
             }
         }
         Some(form)
     });
-    let residual = model.residual_scatter.unwrap_or(0.0);
-    let degrees = model.coefficient_covariance.as_ref().and_then(|covariance| covariance.degrees_of_freedom);
-    let log_log = model.form == ModelForm::LogLog;
-    (residual > 0.0 || coefficients.is_some()).then_some(Scatter { residual, coefficients, degrees, log_log })
+    let mut bent = Vec::new();
+    for one in open.moves(job, output, depth_mm) {
+        match one {
+            Move::Straight(by) => add_product(coefficients.get_or_insert_default(), (&by, &by), 1.0),
+            Move::Bent(_) => bent.push(one),
+        }
+    }
+    let residual = model.and_then(|model| model.residual_scatter).unwrap_or(0.0);
+    let degrees = of_fit.and_then(|covariance| covariance.degrees_of_freedom);
+    let log_log = model.is_none_or(|model| model.form == ModelForm::LogLog);
+    let scatter = Scatter { residual, coefficients, bent: bent.into(), degrees, log_log };
+    (residual > 0.0 || scatter.bends()).then_some(scatter)
+}
+
+/// Adds a product of two rows, times a number, to a quadratic form.
+fn add_product(form: &mut [[f64; 3]; 3], (by, with): (&[f64; 3], &[f64; 3]), times: f64) {
+    for (row, a) in form.iter_mut().zip(by) {
+        row.iter_mut().zip(with).for_each(|(entry, b)| *entry += a * times * b);
+    }
 }
 
 /// A limit in a zone, or of an edge, that a result passes with some probability.
@@ -174,7 +212,7 @@ fn of_part(job: &Job, case: &Case, outcome: &Outcome) -> Vec<Kept> {
     let mut all = Vec::new();
     for OutputLimit { output, name, of, limit } in &OUTPUT_LIMITS {
         all.extend(case.zones.iter().zip(&outcome.zones).filter_map(|(zone, given)| {
-            let scatter = scatter(job, *output, zone.depth_mm)?;
+            let scatter = scatter(job, &case.open, *output, zone.depth_mm)?;
             let (value, limit) = (of(given)?, limit(case, zone)?);
             let beyond = if scatter.log_log { (limit / value).ln() } else { limit - value };
             let at = logarithms(given);
@@ -205,7 +243,7 @@ fn of_edges(job: &Job, case: &Case, outcome: &Outcome) -> (Vec<Kept>, Vec<Kept>)
     let kept = |name, zone: &str, value: f64, limit: f64, beyond: f64| {
         let place = outcome.zones.iter().position(|given| given.id == zone)?;
         let (at, depth_mm) = (logarithms(&outcome.zones[place]), case.zones.get(place)?.depth_mm);
-        let scatter = scatter(job, Output::ToolLife, depth_mm)?;
+        let scatter = scatter(job, &case.open, Output::ToolLife, depth_mm)?;
         let passed = scatter.passed(beyond, at);
         let zone = zone.to_owned();
         Some(Kept { output: Output::ToolLife, name, zone, value, limit, passed, beyond, at, depth_mm })
@@ -254,7 +292,7 @@ pub(in crate::feed_schedule) fn without(job: &Job, case: &Case) -> Vec<Finding> 
     let mut found = Vec::new();
     for output in Output::ALL {
         let is_asked = if output == Output::ToolLife { of_edges } else { is_limited(output) };
-        if is_asked && job.models.get(output).is_some() && scatter(job, output, 1.0).is_none() {
+        if is_asked && job.models.get(output).is_some() && scatter(job, &case.open, output, 1.0).is_none() {
             let at = format!("/models/{}/residual_scatter", output.name());
             found.push(Finding::new("no_scatter_given", at).with("model", output.name()));
         }
@@ -277,7 +315,11 @@ fn told<'k>(of: &'static str, least: &dyn Fn(&Kept) -> f64, places: impl Iterato
 }
 
 /// With which probability the limits are kept; `None` where no model of a limited output states a scatter.
-pub(in crate::feed_schedule) fn conformance(job: &Job, case: &Case, outcome: &Outcome) -> Option<ScheduleConformance> {
+pub(in crate::feed_schedule) fn conformance(
+    job: &Job,
+    case: &Case,
+    outcome: &Outcome,
+) -> Result<Option<ScheduleConformance>, Failure> {
     let part = of_part(job, case, outcome);
     let (lives, edges) = of_edges(job, case, outcome);
     let worst = |name: &'static str, among: &[Kept]| {
@@ -293,21 +335,21 @@ pub(in crate::feed_schedule) fn conformance(job: &Job, case: &Case, outcome: &Ou
     limits.extend(worst("tool_life_min", &lives));
     limits.extend(worst("edge", &edges));
     if limits.is_empty() {
-        return None;
+        return Ok(None);
     }
     limits.sort_by(|a, b| a.probability.total_cmp(&b.probability));
-    let joint = joint(job, &part);
-    Some(ScheduleConformance {
+    let joint = joint(job, &case.open, &part)?;
+    Ok(Some(ScheduleConformance {
         limits,
         joint_probability: (!part.is_empty()).then(|| bounded(joint)),
         gain_percent_per_percent_of_risk: None,
         risk_percent: None,
-    })
+    }))
 }
 
 /// The probability that all limits of a part are kept. Results scatter independently about their models; coefficients that are
-/// uncertain are common to all zones and integrated over.
-fn joint(job: &Job, part: &[Kept]) -> f64 {
+/// uncertain, and what is not known of effects, are common to all zones and integrated over.
+fn joint(job: &Job, open: &OpenModels, part: &[Kept]) -> Result<f64, Failure> {
     let lower = |output: Output| {
         let covariance = job.models.get(output)?.coefficient_covariance.as_ref()?;
         // A covariance of lower rank gets what round-off leaves of it.
@@ -316,8 +358,8 @@ fn joint(job: &Job, part: &[Kept]) -> f64 {
         (&matrix + DMatrix::identity(matrix.nrows(), matrix.nrows()) * share).cholesky().map(|found| found.l())
     };
     let lowers = Output::ALL.map(lower);
-    if lowers.iter().all(Option::is_none) {
-        return part.iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp();
+    if lowers.iter().all(Option::is_none) && open.count() == 0 {
+        return Ok(part.iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp());
     }
     let sizes = lowers.each_ref().map(|lower| lower.as_ref().map_or(0, DMatrix::nrows));
     let moved = |kept: &Kept, scores: &[f64]| -> f64 {
@@ -333,18 +375,24 @@ fn joint(job: &Job, part: &[Kept]) -> f64 {
         let factors = covariance.factors(kept.depth_mm, job.cutting_edge_angle_deg);
         factors.iter().zip(off.iter()).map(|(by, off)| (by[0] + by[1] * u + by[2] * x) * off).sum()
     };
+    let given = part.iter().map(|kept| Given { output: kept.output, at: kept.at, depth_mm: kept.depth_mm }).collect();
+    let by_effects = MovedResults::of(open, job, given)?;
+    let count = if by_effects.are_straight() { POINTS } else { POINTS_BENT };
+    let of_coefficients: usize = sizes.iter().sum();
     let mut sum = 0.0;
-    for scores in points(POINTS, sizes.iter().sum(), SEED) {
+    for scores in points(count, of_coefficients + open.count(), SEED) {
+        let by_effects = by_effects.at(&scores[of_coefficients..])?;
         sum += part
             .iter()
-            .map(|kept| {
+            .zip(by_effects)
+            .map(|(kept, by_effects)| {
                 let residual = job.models.get(kept.output).and_then(|model| model.residual_scatter).unwrap_or(0.0);
-                let left = kept.beyond - moved(kept, &scores);
+                let left = kept.beyond - moved(kept, &scores) - by_effects;
                 if residual > 0.0 { 1.0 - normal_tail(left / residual) } else { f64::from(u8::from(left >= 0.0)) }
             })
             .product::<f64>();
     }
-    sum / POINTS as f64
+    Ok(sum / count as f64)
 }
 
 /// How many standard deviations lie between what is expected and a limit that is passed with this probability.

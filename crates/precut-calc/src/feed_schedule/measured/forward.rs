@@ -9,7 +9,7 @@ use crate::calculator::{
     Rows, Unnamed, checkpoint,
 };
 use crate::effects::{
-    Cause, FactorLevel, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
+    Cause, FactorLevel, JointUncertainty, MACHINABILITY_CAUSES, MachinabilityConditions, MachinabilityEffect as Effect,
 };
 use crate::machinability::{MachinabilityModel, ModelForm};
 
@@ -17,6 +17,7 @@ use crate::feed_schedule::FeedSchedule;
 use crate::feed_schedule::job::acting::ActingModel;
 use crate::feed_schedule::job::input::{Job, Reference};
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::open::ScheduleUncertainty;
 use crate::feed_schedule::job::remainder;
 use crate::feed_schedule::measured::conditions::with_conditions;
 use crate::feed_schedule::measured::consequence::consequences;
@@ -120,6 +121,7 @@ impl ForwardModel for FeedSchedule {
     type Prepared = PreparedMachinability;
 
     const CAUSES: &'static [Cause] = MACHINABILITY_CAUSES;
+    const TAKES_OPEN_EFFECTS: bool = true;
     const QUANTITIES: &'static [Quantity] = QUANTITIES;
     const CONDITIONS: &'static [&'static str] =
         &["speed_m_per_min", "feed_mm_per_rev", "depth_mm", "time_min", "flank_wear_mm"];
@@ -128,8 +130,12 @@ impl ForwardModel for FeedSchedule {
         &job.effects
     }
 
+    fn open_effects(job: &Job) -> &[JointUncertainty] {
+        &job.uncertainty.effects
+    }
+
     fn without_effects(job: &Job) -> Job {
-        Job { effects: Vec::new(), ..job.clone() }
+        Job { effects: Vec::new(), uncertainty: ScheduleUncertainty::default(), ..job.clone() }
     }
 
     fn prepare(

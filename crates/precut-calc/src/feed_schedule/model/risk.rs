@@ -33,6 +33,8 @@ const SHARED: f64 = 1e-6;
 const SETTLED: f64 = 1e-7;
 /// A share of the risk below this is none.
 const NOTHING: f64 = 1e-4;
+/// Steps over speed and over feed in which the largest deviation of an edge's life is looked for where it may bend either way.
+const EDGE_STEPS: usize = 8;
 /// Halvings in which the least risk is found.
 const HALVINGS: u32 = 30;
 /// Steps in which the largest joint probability is found.
@@ -242,7 +244,7 @@ pub(in crate::feed_schedule) fn is_at_an_end(percent: f64) -> bool {
 }
 
 /// A limit of a part whose output scatters: its zone, its place among [`OUTPUT_LIMITS`], and how.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Scattered {
     zone: usize,
     limit: usize,
@@ -250,12 +252,12 @@ struct Scattered {
 }
 
 impl Scattered {
-    fn name(self) -> &'static str {
+    fn name(&self) -> &'static str {
         OUTPUT_LIMITS[self.limit].name
     }
 
     /// Its standard deviation at a schedule, and the slopes of that over ln V and ln S.
-    fn deviation(self, at: &[(f64, f64)]) -> (f64, [f64; 2]) {
+    fn deviation(&self, at: &[(f64, f64)]) -> (f64, [f64; 2]) {
         let (u, x) = at[self.zone];
         self.scatter.deviation(u, x)
     }
@@ -266,7 +268,7 @@ fn scattered(case: &Case, job: &Job) -> Vec<Scattered> {
     for (zone, of) in case.zones.iter().enumerate() {
         for (place, limit) in OUTPUT_LIMITS.iter().enumerate() {
             let is_limited = of.model(limit.output).is_some() && (limit.limit)(case, of).is_some();
-            if let (true, Some(scatter)) = (is_limited, scatter(job, limit.output, of.depth_mm)) {
+            if let (true, Some(scatter)) = (is_limited, scatter(job, &case.open, limit.output, of.depth_mm)) {
                 all.push(Scattered { zone, limit: place, scatter });
             }
         }
@@ -286,19 +288,22 @@ pub(in crate::feed_schedule) fn move_in(case: &mut Case, job: &Job) {
             Risk::Joint { .. } => -((-risk).ln_1p() / all.len().max(1) as f64).exp_m1(),
             _ => job.risk_in_zone(case.zones[one.zone].index).unwrap_or(risk),
         };
-        case.zones[one.zone].margins[one.limit] = Margin::new(one.scatter.deviations(own), one.scatter);
+        case.zones[one.zone].margins[one.limit] = Margin::new(one.scatter.deviations(own), one.scatter.clone());
     }
 }
 
 /// By how much less of the life of an edge is used in a zone: where coefficients are uncertain by the largest that they bring at any
 /// speed and feed that are allowed, so that the risk is never above the stated one.
 fn of_edges(case: &Case, zone: &ZoneCase, job: &Job, risk: f64) -> Option<f64> {
-    let scatter = scatter(job, Output::ToolLife, zone.depth_mm)?;
+    let scatter = scatter(job, &case.open, Output::ToolLife, zone.depth_mm)?;
     let limits = &case.limits;
-    let corners = [limits.speed_min_m_per_min, limits.speed_max_m_per_min]
-        .into_iter()
-        .flat_map(|speed| [limits.feed_min_mm_per_rev, zone.feed_max_mm_per_rev].map(|feed| (speed.ln(), feed.ln())));
-    let largest = corners.map(|(u, x)| scatter.deviation(u, x).0).fold(0.0, f64::max);
+    // A deviation that bends upward is largest in a corner.
+    let steps = if scatter.is_mixed() { EDGE_STEPS } else { 1 };
+    let along = |from: f64, to: f64| (0..=steps).map(move |k| from + (to - from) * k as f64 / steps as f64);
+    let [slowest, fastest] = [limits.speed_min_m_per_min, limits.speed_max_m_per_min].map(f64::ln);
+    let [least, most] = [limits.feed_min_mm_per_rev, zone.feed_max_mm_per_rev].map(f64::ln);
+    let places = along(slowest, fastest).flat_map(|u| along(least, most).map(move |x| (u, x)));
+    let largest = places.map(|(u, x)| scatter.deviation(u, x).0).fold(0.0, f64::max);
     Some(scatter.deviations(risk) * largest)
 }
 
@@ -516,7 +521,7 @@ impl Sharing<'_> {
             solution.row_slacks[*row] = 0.0;
             // Those that take next to nothing of the risk need not stand where they are.
             let most = deviations(NOTHING * self.budget);
-            self.case.zones[one.zone].margins[one.limit] = Margin::new(t.min(most), one.scatter);
+            self.case.zones[one.zone].margins[one.limit] = Margin::new(t.min(most), one.scatter.clone());
         }
         let mut solved = finish(plain, built, solution, shares.at, false, &Variation::default(), conic);
         solved.shares_risk = true;

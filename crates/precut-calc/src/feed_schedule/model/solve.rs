@@ -4,7 +4,7 @@ use crate::calculator::{Failure, Monitor, checkpoint};
 use crate::num::gp::{self, Failed, Layout, Objective, Program, Settings, Solution, Verdict};
 
 use crate::feed_schedule::job::acting::Bend;
-use crate::feed_schedule::job::case::Case;
+use crate::feed_schedule::job::case::{Case, Margin};
 use crate::feed_schedule::job::input::Goal;
 use crate::feed_schedule::job::models::Output;
 use crate::feed_schedule::model::edges::MOST_PARTS;
@@ -436,6 +436,6 @@ pub(in crate::feed_schedule) fn convex(case: &Case) -> bool {
                 Bend::Mixed => false,
             }
         });
-        known && custom
+        known && custom && !zone.margins.iter().any(Margin::is_mixed)
     })
 }

@@ -18,6 +18,7 @@ use crate::feed_schedule::job::input::{
     CustomLimit, FeedMode, Goal, Job, Limits, Machine, Reference, SpeedMode, UsageScope, Variables, Zone,
 };
 use crate::feed_schedule::job::models::{Models, Output};
+use crate::feed_schedule::job::open::ScheduleUncertainty;
 use crate::feed_schedule::job::plan::Method;
 use crate::feed_schedule::model::prices::{self, Again};
 use crate::feed_schedule::model::refusal::worded;
@@ -197,6 +198,7 @@ fn job(stretches: &[Stretch], bounds: &Bounds) -> Job {
         program: crate::deflection_compensation::ProgramSettings::default(),
         reference: None,
         effects: Vec::new(),
+        uncertainty: ScheduleUncertainty::default(),
         conditions: MachinabilityConditions::default(),
     }
 }
