@@ -282,20 +282,54 @@ fn what_takes_longer_is_expected_to() {
     assert!(ms(&read) < 10.0);
 }
 
+/// The least and the most that are told while the force is anything within bounds are those of parts that are driven one by one at the
+/// ends: the program is that of the stated force, and more force leaves the part thicker.
+#[test]
+fn parts_within_bounds_are_good_as_often_as_said_at_the_ends() {
+    let (upper_um, percent) = (3.0, 20.0);
+    let mut job = job(&json!({ "diameter_upper_um": upper_um }));
+    job["uncertainty"]["quantities"][0]["distribution"] = json!({ "kind": "interval", "half_width_percent": percent });
+    let answer = solve(&job);
+    let told = conformance(&answer);
+    eprintln!("{told}");
+    assert_eq!(told["joint"]["interval_search"], "ends");
+    let (text, places, count) = (returned(&answer), judged(&answer), drawn_parts(120));
+    let mut draw = Draw::new(4);
+    let mut shares = Vec::new();
+    for (pointer, force) in
+        [("/joint/probability", 1.0 + percent / 100.0), ("/joint/probability_most", 1.0 - percent / 100.0)]
+    {
+        let is_good = |[largest, _]: [f64; 2]| largest <= upper_um;
+        let mut part = || cut(&job, &text, Truth { force, ..Truth::of(&mut draw) });
+        let good = (0..count).filter(|_| is_good(ends_um(&part(), &places))).count() as f64;
+        let (probability, share) = (number(&told, pointer), good / count as f64);
+        let scatter = (probability * (1.0 - probability) / count as f64).sqrt();
+        eprintln!("force times {force}: {share} of {count}, told {probability}");
+        // As where the force is drawn.
+        let slack = 3.0 * scatter + number(&told, "/joint/numerical_error") + 0.01;
+        assert!((share - probability).abs() <= slack, "{force}: {share} {probability}");
+        shares.push(probability);
+    }
+    assert!(shares[0] > 0.02 && shares[0] + 0.2 < shares[1], "{shares:?}");
+}
+
 #[test]
 fn the_stamp_says_how_probably_the_limits_are_kept() {
-    let mut job = job(&json!({ "diameter_um": 16 }));
-    job["mode"]["stamp"] = json!(true);
-    let answer = solve(&job);
-    let parsed = serde_json::from_value(job).unwrap();
-    let file = ProgramCompensation::returned(&parsed, &answer.output, "precut").unwrap().unwrap();
-    let probability = number(&conformance(&answer), "/joint/probability");
-    let said = format!("lines, within all limits with probability {probability:.3})");
-    assert!(
-        file.text.lines().any(|line| line.starts_with("(precut shifts X") && line.ends_with(&said)),
-        "{}",
-        file.text
-    );
+    let interval = json!({ "kind": "interval", "half_width_percent": 10 });
+    for (bounds, at_least) in [(None, ""), (Some(interval), "at least ")] {
+        let mut job = job(&json!({ "diameter_um": 16 }));
+        job["mode"]["stamp"] = json!(true);
+        if let Some(bounds) = bounds {
+            job["uncertainty"]["quantities"][0]["distribution"] = bounds;
+        }
+        let answer = solve(&job);
+        let parsed = serde_json::from_value(job).unwrap();
+        let file = ProgramCompensation::returned(&parsed, &answer.output, "precut").unwrap().unwrap();
+        let probability = number(&conformance(&answer), "/joint/probability");
+        let said = format!("lines, within all limits with probability {at_least}{probability:.3})");
+        let is_said = |line: &str| line.starts_with("(precut shifts X") && line.ends_with(&said);
+        assert!(file.text.lines().any(is_said), "{said}: {}", file.text);
+    }
 }
 
 #[test]

@@ -50,7 +50,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 11,
+        version: 12,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -196,7 +196,7 @@ impl Calculator for ProgramCompensation {
 
     fn returned(job: &Job, outcome: &Outcome, made_by: &str) -> Option<Result<ReturnedProgram, Failure>> {
         let nothing = || Failure::OutOfModel(Finding::new("no_program_returned", "/mode/kind"));
-        let kept = outcome.conformance.as_ref().map(|sure| sure.joint.probability);
+        let kept = outcome.conformance.as_ref().map(|sure| &sure.joint);
         Some(outcome.compensation.as_ref().map(|one| returned::returned(job, one, (made_by, kept))).ok_or_else(nothing))
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::ops::Range;
 
 use crate::calculator::ReturnedProgram;
+use crate::certainty::JointlyKept;
 
 use super::super::job::{Dialect, Job};
 use super::super::model::correction::{ChangedLine, unified};
@@ -17,7 +18,7 @@ const LONGEST: usize = 220;
 pub(crate) fn returned(
     job: &Job,
     compensation: &CompensatedProgram,
-    (made_by, kept): (&str, Option<f64>),
+    (made_by, kept): (&str, Option<&JointlyKept>),
 ) -> ReturnedProgram {
     let (mut text, mut diff) = (compensation.nc_program.clone(), compensation.diff.clone());
     // What comes back as it was has nothing to say.
@@ -32,12 +33,18 @@ pub(crate) fn returned(
 }
 
 /// The comment.
-fn stamp(dialect: Dialect, changes: &[LineChange], (made_by, does, kept): (&str, &str, Option<f64>)) -> String {
+fn stamp(
+    dialect: Dialect,
+    changes: &[LineChange],
+    (made_by, does, kept): (&str, &str, Option<&JointlyKept>),
+) -> String {
     let largest = |change: &LineChange| change.smallest_shift_um.abs().max(change.largest_shift_um.abs());
     let shift_um = changes.iter().map(largest).fold(0.0, f64::max);
     let mut said = format!("{made_by} {does} by up to {shift_um:.0} um in {} lines", changes.len());
     if let Some(kept) = kept {
-        let _ = write!(said, ", within all limits with probability {kept:.3}");
+        // Within bounds it is the least.
+        let at_least = if kept.probability_most.is_some() { "at least " } else { "" };
+        let _ = write!(said, ", within all limits with probability {at_least}{:.3}", kept.probability);
     }
     // Nothing in a comment acts, whatever names the answer.
     let plain = said.chars().map(|c| if c.is_ascii_alphanumeric() || " .,:-_".contains(c) { c } else { ' ' });
