@@ -1,12 +1,13 @@
 //! Quantities of which bounds alone are known: the least and the largest probability within them, against closed forms and against
 //! jobs that state what lies at the ends.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::cast_precision_loss, missing_docs)]
 
 use precut_calc::certainty::{IntervalSearch, JointlyKept};
 use serde_json::{Value, json};
 
 use crate::deflection_certainty::{below, job as shaft, number};
-use crate::fixture_certainty::{meant, reference, told};
+use crate::draw::Draw;
+use crate::fixture_certainty::{drawn, is_quiet, meant, reference, told};
 use crate::fixture_support::{checked, outcome, with};
 use crate::milling_answers::{faults as faults_of_cut, merged, solve};
 use crate::milling_certainty::{conformance as of_cut, how_sure};
@@ -117,6 +118,39 @@ fn a_vise_within_bounds_is_between_those_at_the_ends() {
     bounds["uncertainty"]["correlations"] = json!([{ "between": ["damping", "cutting_force"], "coefficient": 0.5 }]);
     let faults = checked(&with(&bounds, "/analyses", json!(["certainty"]))).unwrap_err();
     assert!(faults.iter().any(|(code, _)| code == "interval_correlated"), "{faults:?}");
+}
+
+/// The depth that is told of a vise within bounds is cut at their worst end, by vises that are drawn there one by one: as many of
+/// them stay quiet as was wanted.
+#[test]
+fn the_depth_within_bounds_is_as_sure_as_wanted_at_the_worst_end() {
+    let vises = std::env::var("PRECUT_CERTAINTY_VISES").map_or(60, |count| count.parse().unwrap());
+    let (wanted, percent_off) = (0.8, 25.0);
+    let mut job = meant(&reference("x2-joints-and-slip"));
+    job["uncertainty"]["quantities"].as_array_mut().unwrap().retain(|one| one["quantity"] != "damping");
+    let mut bounds = with(&job, "/analyses", json!(["certainty"]));
+    bounds["uncertainty"]["wanted_probability"] = json!(wanted);
+    bounds["uncertainty"]["quantities"].as_array_mut().unwrap().push(percent("damping", percent_off));
+    let deep = outcome(&bounds).conformance.unwrap().depth_at_wanted_mm.unwrap();
+    let at = |factor: f64| {
+        let mut there = with(&job, "/cut/depth_mm", json!(deep));
+        for joint in ["movable_joint", "fixed_joint"] {
+            let damping = there["fixture"][joint]["damping_n_s_per_mm"].as_f64().unwrap();
+            there["fixture"][joint]["damping_n_s_per_mm"] = json!(factor * damping);
+        }
+        there
+    };
+    // Found to 0.01 of a standard normal score, and to the error of every depth that was tried.
+    let (worst, error) = told(&outcome(&at(1.0 - percent_off / 100.0)), "all");
+    let (best, _) = told(&outcome(&at(1.0 + percent_off / 100.0)), "all");
+    eprintln!("{deep} mm: {worst} +- {error} at the worst end, {best} at the best");
+    assert!((worst - wanted).abs() < error + 0.003, "{deep} mm: {worst} +- {error}");
+    assert!(best > wanted + 0.05, "{best}");
+    let mut draw = Draw::new(23);
+    let quiet = (0..vises).filter(|_| is_quiet(&drawn(&at(1.0 - percent_off / 100.0), &mut draw))).count();
+    let (share, deviation) = (quiet as f64 / f64::from(vises), (wanted * (1.0 - wanted) / f64::from(vises)).sqrt());
+    eprintln!("quiet {share} of {vises}");
+    assert!((share - wanted).abs() < 2.5 * deviation + error, "{share}");
 }
 
 #[test]

@@ -141,7 +141,7 @@ fn drawn_vises_stay_quiet_as_often_as_told() {
 }
 
 /// The same job with numbers as a draw has them, and nothing uncertain.
-fn drawn(job: &Value, draw: &mut Draw) -> Value {
+pub(crate) fn drawn(job: &Value, draw: &mut Draw) -> Value {
     let mut drawn = job.clone();
     let scale = |job: &mut Value, pointer: &str, factor: f64| {
         let value = number(job, pointer) * factor;
@@ -174,7 +174,7 @@ fn normal(draw: &mut Draw) -> f64 {
     (-2.0 * draw.between(1e-12, 1.0).ln()).sqrt() * (std::f64::consts::TAU * draw.share()).cos()
 }
 
-fn is_quiet(job: &Value) -> bool {
+pub(crate) fn is_quiet(job: &Value) -> bool {
     let (modulus, _) = multiplier_modulus(&checked(job).unwrap()).unwrap();
     if modulus >= 1.0 {
         return false;
