@@ -117,48 +117,47 @@ fn posterior(is_bent: bool) -> (Value, Value) {
 /// Parts drawn with the effects as they may be keep the limits as often as told, each and together; effects go together over outputs.
 #[test]
 fn parts_of_a_posterior_keep_their_limits_as_often_as_said() {
-    for is_bent in [false, true] {
+    let [each, joint] = [json!({ "kind": "each", "risk_percent": 5 }), json!({ "kind": "joint", "risk_percent": 10 })];
+    for (is_bent, risk) in [(false, joint), (true, each)] {
         let (effects, open) = posterior(is_bent);
-        for risk in [json!({ "kind": "each", "risk_percent": 5 }), json!({ "kind": "joint", "risk_percent": 10 })] {
-            let mut job = job(effects.clone(), open.clone());
-            job["risk"] = risk;
-            // So narrow that both limits are passed.
-            for zone in job["zones"].as_array_mut().unwrap() {
-                zone["deflection_max_um"] = json!(0.7 * zone["deflection_max_um"].as_f64().unwrap());
-            }
-            let answer = solved(&job);
-            let told = &answer["conformance"];
-            let mut draw = Draw::new(31);
-            let (mut kept, mut all) = ([[0_u32; 2]; 3], 0_u32);
-            for _ in 0..DRAWS {
-                let scores = [normal(&mut draw), normal(&mut draw)];
-                let mut is_good = true;
-                for (zone, of_zone) in kept.iter_mut().enumerate() {
-                    let results = drawn(&job, &answer, zone, is_bent, scores, &mut draw);
-                    let limits = ["roughness_max_um", "deflection_max_um"];
-                    for ((field, result), count) in limits.iter().zip(results).zip(of_zone) {
-                        let is_kept = result <= number(&job, &format!("/zones/{zone}/{field}"));
-                        *count += u32::from(is_kept);
-                        is_good &= is_kept;
-                    }
+        let mut job = job(effects, open);
+        job["risk"] = risk;
+        // So narrow that both limits are passed.
+        for zone in job["zones"].as_array_mut().unwrap() {
+            zone["deflection_max_um"] = json!(0.7 * zone["deflection_max_um"].as_f64().unwrap());
+        }
+        let answer = solved(&job);
+        let told = &answer["conformance"];
+        let mut draw = Draw::new(31);
+        let (mut kept, mut all) = ([[0_u32; 2]; 3], 0_u32);
+        for _ in 0..DRAWS {
+            let scores = [normal(&mut draw), normal(&mut draw)];
+            let mut is_good = true;
+            for (zone, of_zone) in kept.iter_mut().enumerate() {
+                let results = drawn(&job, &answer, zone, is_bent, scores, &mut draw);
+                let limits = ["roughness_max_um", "deflection_max_um"];
+                for ((field, result), count) in limits.iter().zip(results).zip(of_zone) {
+                    let is_kept = result <= number(&job, &format!("/zones/{zone}/{field}"));
+                    *count += u32::from(is_kept);
+                    is_good &= is_kept;
                 }
-                all += u32::from(is_good);
             }
-            let share = |count: u32| f64::from(count) / f64::from(DRAWS);
-            let joint = number(told, "/joint_probability");
-            eprintln!("{}: told {joint:.4}, kept {:.4}", job["risk"]["kind"], share(all));
-            // The worst share of 20,000 is within 0.004 by three deviations; what bends is told by its slope at the schedule.
-            assert!((share(all) - joint).abs() < 0.01, "told {joint}, kept {}", share(all));
-            for (place, name) in ["roughness", "deflection"].iter().enumerate() {
-                let worst = told["limits"].as_array().unwrap().iter().find(|one| one["limit"] == *name).unwrap();
-                let least = kept.iter().map(|zone| share(zone[place])).fold(1.0, f64::min);
-                eprintln!("    {name}: told {worst}, kept {least:.4}");
-                assert!((least - number(worst, "/probability")).abs() < 0.01, "{worst}, kept {least}");
-            }
-            if job["risk"]["kind"] == "joint" {
-                // Boole's bound keeps more than is asked.
-                assert!(share(all) > 0.89, "{}", share(all));
-            }
+            all += u32::from(is_good);
+        }
+        let share = |count: u32| f64::from(count) / f64::from(DRAWS);
+        let joint = number(told, "/joint_probability");
+        eprintln!("{}: told {joint:.4}, kept {:.4}", job["risk"]["kind"], share(all));
+        // Three deviations of 20,000 draws are 0.007; what bends is told by its slope at the schedule.
+        assert!((share(all) - joint).abs() < 0.01, "told {joint}, kept {}", share(all));
+        for (place, name) in ["roughness", "deflection"].iter().enumerate() {
+            let worst = told["limits"].as_array().unwrap().iter().find(|one| one["limit"] == *name).unwrap();
+            let least = kept.iter().map(|zone| share(zone[place])).fold(1.0, f64::min);
+            eprintln!("    {name}: told {worst}, kept {least:.4}");
+            assert!((least - number(worst, "/probability")).abs() < 0.01, "{worst}, kept {least}");
+        }
+        if job["risk"]["kind"] == "joint" {
+            // Boole's bound keeps more than is asked.
+            assert!(share(all) > 0.89, "{}", share(all));
         }
     }
 }

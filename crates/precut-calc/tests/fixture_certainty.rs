@@ -136,6 +136,8 @@ fn drawn_vises_stay_quiet_as_often_as_told() {
         let share = quiet as f64 / vises as f64;
         let deviation = (probability * (1.0 - probability) / vises as f64).sqrt();
         eprintln!("{depth} mm: told {probability} +- {error}, quiet {share} of {vises}");
+        // Lines across the lobes told up to 0.031, those along them 0.003 to 0.011.
+        assert!(error < 0.016, "{depth}: {error}");
         assert!((share - probability).abs() < 2.5 * deviation + error, "{depth}: {share}, told {probability}");
     }
 }

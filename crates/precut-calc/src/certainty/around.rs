@@ -3,11 +3,18 @@
 
 use crate::calculator::{Failure, Monitor};
 
-use super::lines::{Effort, Found, Margins, Question, Together};
+use super::lines::{Effort, Found, Margins, Question, Together, points};
 use super::{Contribution, Quantity, Surface, Uncertain, Uncertainties, bounded};
 
 /// A margin beyond this, of a logarithm, is as good as without end.
 const FAR: f64 = 50.0;
+
+/// Draws by which it is seen which limits are passed, steps to each side over a quantity in standard deviations, and the share of a
+/// limit's variance by which the response surface may be off over one.
+const TRIED: usize = 64;
+const STEPS: i32 = 5;
+const STEP: f64 = 0.5;
+const ASTRAY: f64 = 0.05;
 
 /// A margin as it may be counted with.
 pub(crate) fn far(margin: f64) -> f64 {
@@ -103,6 +110,46 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         (self.slopes, self.distances) = (slopes, distances);
     }
 
+    /// Along which the lines of the real model run. Where a limit that is passed changes otherwise than the response surface says, over the
+    /// quantity over which it does so most: all of that then lies along the lines. Elsewhere as limits change together.
+    fn along(&self) -> Result<Vec<f64>, Failure> {
+        let of = self.asked.uncertainties;
+        let count = of.dimensions();
+        let at = |scores: &[f64]| -> Result<Vec<f64>, Failure> {
+            let margins = self.asked.tried(&of.values(scores))?;
+            Ok(self.asked.limits.iter().map(|&limit| margins[limit].max(-FAR)).collect())
+        };
+        let drawn =
+            points(TRIED, count, self.asked.seed).map(|scores| at(&scores)).collect::<Result<Vec<_>, Failure>>()?;
+        let variance = |limit: usize| {
+            let mean = drawn.iter().map(|one| one[limit]).sum::<f64>() / TRIED as f64;
+            drawn.iter().map(|one| (one[limit] - mean).powi(2)).sum::<f64>() / TRIED as f64
+        };
+        let is_passed = |limit: &usize| drawn.iter().any(|one| one[*limit] < 0.0);
+        let passed: Vec<usize> = (0..self.asked.limits.len()).filter(is_passed).collect();
+        let mut axis = self.axis.clone();
+        let mut largest = ASTRAY;
+        for score in (0..count).filter(|_| !passed.is_empty() && count > 1) {
+            let mut off = vec![0.0; self.asked.limits.len()];
+            for step in -STEPS..=STEPS {
+                let mut scores = vec![0.0; count];
+                scores[score] = STEP * f64::from(step);
+                let density = (-0.5 * scores[score] * scores[score]).exp() / (2.0 * std::f64::consts::PI).sqrt();
+                let near = self.near(of, &scores, true);
+                for ((off, real), limit) in off.iter_mut().zip(at(&scores)?).zip(self.asked.limits) {
+                    *off += STEP * density * (real - near[*limit]).powi(2);
+                }
+            }
+            let share =
+                passed.iter().map(|&limit| off[limit] / variance(limit).max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
+            if share > largest {
+                largest = share;
+                axis = (0..count).map(|other| f64::from(u8::from(other == score))).collect();
+            }
+        }
+        Ok(axis)
+    }
+
     fn question(&self, most_lines: usize) -> Question<'_, S> {
         let effort = Effort { seed: self.asked.seed, most_lines };
         Question { axis: &self.axis, sets: self.asked.sets.clone(), effort, monitor: self.asked.monitor }
@@ -114,7 +161,8 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         let [most, most_real] = self.asked.most_lines;
         let mut real = |g: &[f64]| self.asked.tried(&of.values(g));
         let near = &mut |g: &[f64]| Ok(self.near(of, g, true));
-        let mut found = self.question(most).of_real(most_real, &mut real, near)?;
+        let axis = self.along()?;
+        let mut found = Question { axis: &axis, ..self.question(most) }.of_regressed(most_real, &mut real, near)?;
         let all = found.of[S - 1].probability;
         found.of.iter_mut().for_each(|of| of.probability = of.probability.max(all));
         Ok(found)

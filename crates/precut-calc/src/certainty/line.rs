@@ -30,6 +30,11 @@ pub(super) fn places() -> impl Iterator<Item = f64> {
     (0..=INTERVALS).map(move |index| step.mul_add(index as f64, -REACH))
 }
 
+/// Those of them beyond which lies less than 1e-5.
+fn places_within() -> impl Iterator<Item = f64> {
+    places().filter(|place| place.abs() <= RARE)
+}
+
 /// A line: which limits are kept between which places.
 pub(super) struct Line<const K: usize> {
     /// Whether each is kept at the beginning.
@@ -40,8 +45,20 @@ pub(super) struct Line<const K: usize> {
 
 impl<const K: usize> Line<K> {
     pub(super) fn scanned(margins: &mut dyn FnMut(f64) -> Result<Margins<K>, Failure>) -> Result<Self, Failure> {
+        Self::scanned_at(&mut places(), margins)
+    }
+
+    /// The same without what is rare: beyond, limits are kept as they are at its beginning.
+    pub(super) fn scanned_within(margins: &mut dyn FnMut(f64) -> Result<Margins<K>, Failure>) -> Result<Self, Failure> {
+        Self::scanned_at(&mut places_within(), margins)
+    }
+
+    fn scanned_at(
+        places: &mut dyn Iterator<Item = f64>,
+        margins: &mut dyn FnMut(f64) -> Result<Margins<K>, Failure>,
+    ) -> Result<Self, Failure> {
         let mut nodes = Vec::with_capacity(2 * INTERVALS);
-        for place in places() {
+        for place in places {
             nodes.push((place, margins(place)?));
         }
         // Between two nodes a limit may be kept that is passed at both.

@@ -15,11 +15,16 @@ use crate::calculator::{Failure, Monitor, checkpoint};
 
 use super::line::{Line, places};
 use super::normal_quantile;
+use super::regression::slopes;
 
 /// Independent scramblings; their spread is the error.
 pub(crate) const SCRAMBLINGS: usize = 8;
 /// Lines of a scrambling at first: of the near model, and of the real one.
 const FIRST_LINES: [usize; 2] = [8, 2];
+/// Lines of a scrambling at first, of the real model beside a near one that may be far off.
+const FIRST_REGRESSED: usize = 4;
+/// A probability no nearer to 0 or 1 than this is told without the far ends of lines.
+const NOT_RARE: f64 = 0.002;
 /// Points of a scrambling at which a model is asked at first that costs much.
 const FIRST_POINTS: usize = 16;
 /// Largest error, of the probability and relative to the smaller of it and its complement.
@@ -110,6 +115,38 @@ impl<const S: usize> Question<'_, S> {
         near: &mut Values<'_, K>,
     ) -> Result<Found<S>, Failure> {
         self.of_both(most_real, near, &mut |_, at| Line::scanned(&mut |place| real(&at(place))))
+    }
+
+    /// The same beside a near model that may be far off. Of what that says of every set on a line so much counts as tells of the real model on
+    /// the lines of the other scramblings (control variates by regression): where it tells nothing it does no harm, and the expectation is
+    /// that of the real model all the same.
+    pub(crate) fn of_regressed<const K: usize>(
+        &self,
+        most_real: usize,
+        real: &mut Values<'_, K>,
+        near: &mut Values<'_, K>,
+    ) -> Result<Found<S>, Failure> {
+        let mut nearly = Lines::of(self);
+        nearly.until(NEAR_SHARE, near)?;
+        let mut really = Lines::of(self);
+        let most = most_real.min(nearly.done());
+        let about = nearly.found(nearly.done()).of[S - 1].probability;
+        let is_rare = about.min(1.0 - about) < NOT_RARE;
+        let mut count = FIRST_REGRESSED.min(most);
+        loop {
+            really.extend_by(count, &mut |at| {
+                let mut margins = |place: f64| real(&at(place));
+                if is_rare { Line::scanned(&mut margins) } else { Line::scanned_within(&mut margins) }
+            })?;
+            let found = Found {
+                of: std::array::from_fn(|set| Estimate::of(regressed(&nearly, &really, set))),
+                lines: SCRAMBLINGS * count,
+            };
+            if found.of[S - 1].is_enough(1.0) || count >= most {
+                return Ok(found);
+            }
+            count = (2 * count).min(most);
+        }
     }
 
     /// The same of a real model that costs much. On its lines it is asked only near the places where the near model passes a limit: it
@@ -217,10 +254,37 @@ impl<'a, const S: usize> Lines<'a, S> {
         std::array::from_fn(|one| self.of[one][..count].iter().map(|line| line[set]).sum::<f64>() / count.max(1) as f64)
     }
 
+    /// Means of all sets over the first lines of a scrambling.
+    fn means_of(&self, scrambling: usize, count: usize) -> [f64; S] {
+        let lines = &self.of[scrambling][..count];
+        std::array::from_fn(|set| lines.iter().map(|line| line[set]).sum::<f64>() / count.max(1) as f64)
+    }
+
     fn found(&self, count: usize) -> Found<S> {
         let of = std::array::from_fn(|set| Estimate::of(self.means(set, count)));
         Found { of, lines: SCRAMBLINGS * count }
     }
+}
+
+/// Means of a set by the real model over its lines of every scrambling, moved by what the near model is off on the same lines.
+fn regressed<const S: usize>(nearly: &Lines<'_, S>, really: &Lines<'_, S>, set: usize) -> [f64; SCRAMBLINGS] {
+    let count = really.done();
+    let means = really.means(set, count);
+    // Of limits that do not go together a set changes with each of them as with a factor.
+    let mean = |lines: &Lines<'_, S>, set: usize| lines.found(lines.done()).of[set].probability;
+    let whole = mean(nearly, S - 1);
+    let expected = std::array::from_fn(|k| match (set == S - 1, k == S - 1) {
+        (true, false) => whole / mean(nearly, k).max(NOT_RARE),
+        (false, _) if k == set => 1.0,
+        _ => 0.0,
+    });
+    std::array::from_fn(|own| {
+        let others = (0..SCRAMBLINGS).filter(|one| *one != own);
+        let lines = others.flat_map(|one| nearly.of[one][..count].iter().zip(&really.of[one]));
+        let by = slopes(&lines.map(|(near, real)| (*near, real[set])).collect::<Vec<_>>(), expected);
+        let [all, asked] = [nearly.done(), count].map(|count| nearly.means_of(own, count));
+        means[own] + (0..S).map(|k| by[k] * (all[k] - asked[k])).sum::<f64>()
+    })
 }
 
 impl Effort {
@@ -515,6 +579,22 @@ mod tests {
         let question = Question { axis: &[3.0, 4.0], sets: [0..=0], effort: EFFORT, monitor: &Unwatched };
         let found = question.of_real(256, &mut |g| Ok(plane(g)), &mut |g| Ok(plane(g))).unwrap();
         assert_eq!(found.lines, SCRAMBLINGS * FIRST_LINES[1]);
+    }
+
+    #[test]
+    fn a_near_model_that_is_far_off_does_no_harm() {
+        // The real model has a second limit that the near one has elsewhere, and bends.
+        let real = |g: &[f64]| [1.0 - g[0] - 0.1 * g[1] * g[1], 4.0 + g[1] + 0.2 * g[2]];
+        let near = |g: &[f64]| [1.0 - g[0], 0.5 + g[2] - g[1]];
+        let question = Question { axis: &[1.0, 0.0, 0.0], sets: [0..=0, 0..=1], effort: EFFORT, monitor: &Unwatched };
+        let alone = question.of(&mut |g| Ok(real(g))).unwrap();
+        let found = question.of_regressed(32, &mut |g| Ok(real(g)), &mut |g| Ok(near(g))).unwrap();
+        let added = question.of_real(32, &mut |g| Ok(real(g)), &mut |g| Ok(near(g))).unwrap();
+        for (alone, found) in alone.of.into_iter().zip(found.of) {
+            let error = alone.error.hypot(found.error);
+            assert!((alone.probability - found.probability).abs() < 1.5 * error + 1e-4, "{alone:?} {found:?}");
+        }
+        assert!(found.of[1].error < 0.3 * added.of[1].error, "{found:?} {added:?}");
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub(crate) mod lines;
 pub(crate) mod open;
 pub(crate) mod picture;
 mod quantities;
+mod regression;
 mod scores;
 mod surface;
 

@@ -262,7 +262,7 @@ impl ActingModel {
     pub(in crate::feed_schedule) fn straight_from(&self, other: &Self) -> Option<[f64; 3]> {
         // What is joined to the rest of the model, or added to its exponential, bends what moves beneath it.
         let is_plain = |model: &Self| model.floor.is_none() && (model.offset == 0.0 || !model.base.log_log);
-        let bends_alike = self.quadratic.iter().zip(&other.quadratic).all(|(own, other)| (own - other).abs() <= 0.0)
+        let bends_alike = self.quadratic.iter().zip(&other.quadratic).all(|(a, b)| (a - b).abs() <= 0.0)
             && self.hump == other.hump
             && self.tables == other.tables
             && self.formulas == other.formulas;

@@ -138,7 +138,7 @@ impl Judging<LIMITS, { LIMITS + 1 }> for Judged<'_> {
     type At = Working;
 
     const NAMES: [(&'static str, &'static str); LIMITS] = NAMES;
-    const MOST_LINES: [usize; 2] = [16; 2];
+    const MOST_LINES: [usize; 2] = [512, 16];
     const MOST_LINES_TRIED: [usize; 2] = Self::MOST_LINES;
 
     fn uncertainties(&self) -> &Uncertainties<FixtureQuantity> {

@@ -153,8 +153,8 @@ impl Judging<LIMITS, { LIMITS + 1 }> for Judged<'_> {
     type At = f64;
 
     const NAMES: [(&'static str, &'static str); LIMITS] = NAMES;
-    const MOST_LINES: [usize; 2] = [128, 32];
-    const MOST_LINES_TRIED: [usize; 2] = [64, 4];
+    const MOST_LINES: [usize; 2] = [512, 32];
+    const MOST_LINES_TRIED: [usize; 2] = [512, 8];
 
     fn uncertainties(&self) -> &Uncertainties<OneQuantity> {
         &self.of
