@@ -269,14 +269,14 @@ fn the_search_over_rings_loses_no_set() {
 
 #[test]
 fn the_search_over_vises_loses_no_set() {
-    search_keeps_what_is_there::<FixtureStability>(fixture::draw, 80, 6);
+    search_keeps_what_is_there::<FixtureStability>(fixture::draw, 80, 4);
 }
 
 /// A mass that swings on the workpiece shows near its own frequency alone: from another one it is not found.
 #[test]
 fn the_search_over_vises_loses_no_second_mode() {
     let draw: Draw = |_, snr, seed| fixture::draw_hiding("second_mode", snr, seed);
-    search_keeps_what_is_there::<FixtureStability>(draw, 81, 6);
+    search_keeps_what_is_there::<FixtureStability>(draw, 81, 3);
 }
 
 /// What is promised of a compensated shaft is what the path leaves that the calculator puts out.

@@ -21,7 +21,7 @@ fn nothing_hidden_raises_no_alarm() {
 
 #[test]
 fn one_hidden_cause_is_named_right_or_not_at_all() {
-    let score = score("fixture-one", Class::One, 5.0, 2, 8);
+    let score = score("fixture-one", Class::One, 5.0, 2, 6);
     assert!(score.named_right.reaches(0.96), "{}", score.named_right);
     assert!(score.truth_listed.reaches(0.90), "{}", score.truth_listed);
 }
