@@ -93,8 +93,8 @@ impl Work for Composed {
     ) -> BoxFuture<'static, Result<Ending, Error>> {
         Box::pin(async move {
             let ready = prepared(&self.entry, self.input, &slot).await?;
-            let apart = !slot.is_short() && ready.key == self.key;
-            let stored = match ready.prepared.sharded().filter(|_| apart) {
+            let in_shards = !slot.is_short() && ready.key == self.key;
+            let stored = match ready.prepared.sharded().filter(|_| in_shards) {
                 Some(sharded) => shards::gathered(&engine, (ready, sharded), &running, slot).await,
                 None => Inner::calculate(&engine, ready, &running, slot).await,
             };

@@ -21,8 +21,6 @@ const NAMED: f64 = 0.8;
 const NAMED_IF_COMMON: f64 = 0.5;
 /// Share of the named posterior that the list of likely sets holds.
 const LIKELY: f64 = 0.95;
-/// Likely sets that are held against classes drawn from them: as many as a list should have at most.
-const MOST_TESTED: usize = 8;
 /// Posterior of the remainder from which on no set is named: one in ten, as much as "nothing" may have in an alarm.
 pub(in crate::diagnosis) const UNNAMED_MATTERS: f64 = ALARM;
 /// Of rows along or round a part the share of the level at which a test speaks against the base. How neighbours hang together is
@@ -63,7 +61,7 @@ impl Weighing<'_> {
             let fit = margins.map(|margins| fit_of_classes(self, margins, sides, monitor)).transpose()?;
             Ok((set.members.clone(), fit.flatten()))
         };
-        self.likely_sets().iter().take(MOST_TESTED).map(of_set).collect()
+        self.likely_sets().iter().map(of_set).collect()
     }
 
     /// Margins of the rows that count in standard deviations of their scatter where a set is at its most probable.
