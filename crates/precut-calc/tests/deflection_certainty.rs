@@ -11,7 +11,7 @@ use precut_calc::calculator::{Calculator as _, Unwatched};
 use precut_calc::deflection_compensation::DeflectionCompensation;
 use serde_json::{Value, json};
 
-fn solved(job: &Value) -> Value {
+pub(crate) fn solved(job: &Value) -> Value {
     serde_json::to_value(crate::support::solved(job.clone())).unwrap()
 }
 
@@ -219,7 +219,7 @@ fn is_good(errors: &[f64], lower: f64, upper: f64) -> bool {
 /// Standard deviations of force, stiffness (relative) and of the tool's setting, um.
 const WIDTHS: [f64; 3] = [0.12, 0.1, 3.0];
 
-fn uncertain_job(tolerance: &Value) -> Value {
+pub(crate) fn uncertain_job(tolerance: &Value) -> Value {
     let normal = |name: &str, width: Value| json!({ "quantity": name, "distribution": width });
     job(
         &json!([

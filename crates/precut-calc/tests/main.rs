@@ -24,6 +24,7 @@ mod deflection_clocks;
 mod deflection_defaults;
 mod deflection_effects;
 mod deflection_faults;
+mod deflection_other_cuts;
 mod deflection_program;
 mod deflection_properties;
 mod deflection_reference;

@@ -94,7 +94,8 @@ pub struct JointlyKept {
     pub probability_most: Option<f64>,
     /// How least and most were looked for within the bounds; null where every quantity has a distribution.
     pub interval_search: Option<IntervalSearch>,
-    /// Twice the standard error of the probability.
+    /// Twice the standard error of the probability. Where nobody has checked it by the real model (`method`), what the bends of the
+    /// response surface make of it, where that is more.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub numerical_error: f64,
     /// The probability that the job wants.
@@ -296,21 +297,89 @@ pub enum Improvement {
         #[schema(extensions(("x-unit" = json!("1"))))]
         gain: f64,
     },
+    /// Take the last pass with a smaller feed.
+    LowerFeed {
+        /// Feed of the last pass.
+        #[schema(extensions(("x-unit" = json!("mm/rev"))))]
+        feed_mm_per_rev: f64,
+        /// Probability that a part is good then.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
+    /// Leave less for the last pass: a compensated pass before it turns down to this diameter.
+    ShallowerLastPass {
+        /// Diameter that the pass before the last turns down to.
+        #[schema(extensions(("x-unit" = json!("mm"))))]
+        diameter_mm: f64,
+        /// Probability that a part is good then.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
+    /// Hold the part by one more steady rest.
+    AddSteadyRest {
+        /// Where.
+        #[schema(extensions(("x-unit" = json!("mm"))))]
+        z_mm: f64,
+        /// How compliant it is taken to be.
+        #[schema(extensions(("x-unit" = json!("um/N"))))]
+        compliance_um_per_n: f64,
+        /// Probability that a part is good then.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
+    /// Hold the free end by a centre.
+    AddCentre {
+        /// Where.
+        #[schema(extensions(("x-unit" = json!("mm"))))]
+        z_mm: f64,
+        /// How compliant it is taken to be.
+        #[schema(extensions(("x-unit" = json!("um/N"))))]
+        compliance_um_per_n: f64,
+        /// Probability that a part is good then.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        joint_probability: f64,
+        /// By how much that is more.
+        #[schema(extensions(("x-unit" = json!("1"))))]
+        gain: f64,
+    },
 }
 
 impl Improvement {
     /// By how much it raises the probability.
     pub fn gain(&self) -> f64 {
         match *self {
-            Self::ShiftAim { gain, .. } | Self::MeasureFirstPart { gain, .. } => gain,
+            Self::ShiftAim { gain, .. }
+            | Self::MeasureFirstPart { gain, .. }
+            | Self::LowerFeed { gain, .. }
+            | Self::ShallowerLastPass { gain, .. }
+            | Self::AddSteadyRest { gain, .. }
+            | Self::AddCentre { gain, .. } => gain,
         }
+    }
+}
+
+impl Conformance {
+    /// With more that would raise the probability.
+    pub(crate) fn advise(&mut self, more: Vec<Improvement>) {
+        self.advice.extend(more);
+        self.advice.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
     }
 }
 
 /// How probabilities were found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ConformanceMethod {
-    /// Lines through the scores that were integrated over the real model.
+    /// Lines through the scores that were integrated over the real model; 0 where a response surface about the stated values tells
+    /// the probability, and nobody has checked that.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub integrated_lines: u32,
     /// Joint probability of the model that is linear about the stated values.
@@ -319,6 +388,13 @@ pub struct ConformanceMethod {
     /// Seed of the points.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub seed: u32,
+}
+
+impl ConformanceMethod {
+    /// Whether the real model was asked.
+    pub(crate) fn is_checked(&self) -> bool {
+        self.integrated_lines > 0
+    }
 }
 
 #[cfg(test)]

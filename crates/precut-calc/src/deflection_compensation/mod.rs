@@ -48,15 +48,17 @@ use crate::calculator::{
     Answer, Basis, Calculator, CalculatorKind, Codes, Cost, Example, Failure, Figure, Hallmark, Message, Meta, Monitor,
     Program, ProgramOrigin, Table,
 };
-use crate::certainty::{self, Conformance};
-use crate::diameters::{self, Judged};
+use crate::certainty;
+use crate::diameters;
 use crate::force;
 use crate::shaft::places;
 use crate::turning::Proof;
 
 use answer::advice::SeenAlong;
+use answer::aimed::{Sure, aimed};
 use answer::columns::{Errors, columns, uncertainty_um};
-use answer::driven::{Driven, drive};
+use answer::driven::Driven;
+use answer::other_cuts::improvements;
 use job::acting::Acting;
 use job::grid::{Grid, path_station_count, station_count};
 use model::cut::one_step;
@@ -75,7 +77,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 11,
+        version: 12,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \
@@ -221,6 +223,9 @@ fn run(job: &Job, monitor: &dyn Monitor) -> Result<Answer<Outcome>, Failure> {
     let mut outcome = Assembly { asked, job, grid: &grid, acting: &acting, stage: &stage }
         .outcome(driven, passes, &errors, monitor)?;
     outcome.included_automatically = included_automatically;
+    if let Some(conformance) = &mut sure.conformance {
+        conformance.advise(improvements(asked, &conformance.joint, outcome.one_more_rest.as_ref(), monitor)?);
+    }
     (outcome.aim_shift_um, outcome.conformance, outcome.error_fan) = (sure.aim_um, sure.conformance, sure.fan);
     let uncertainty_um = uncertainty_um(job, &grid, &acting, &stage)?;
     let drawn = drawn.flatten();
@@ -241,57 +246,6 @@ struct Along {
     drawn: Option<answer::toolpath::Drawn>,
     proof: Option<Proof>,
     sure: Sure,
-}
-
-/// Where the last cut is aimed at, and how sure it is to come out well.
-#[derive(Default)]
-struct Sure {
-    aim_um: f64,
-    conformance: Option<Conformance>,
-    fan: Option<ErrorFan>,
-}
-
-/// The cuts of a job, the last one aimed as the job says, and how sure they are to come out well.
-fn aimed<'a>(
-    job: &'a Job,
-    grid: &Grid,
-    acting: &'a Acting,
-    look: &mut dyn FnMut(&Grid, &Stage, usize),
-    monitor: &dyn Monitor,
-) -> Result<(Driven<'a>, Sure), Failure> {
-    let (driven, aim_um) = cuts_at_aim(job, grid, acting, look, monitor)?;
-    let mut sure = Sure { aim_um, ..Sure::default() };
-    if let Some(rehearsal) = &driven.rehearsal {
-        // The path of the rehearsal is aimed already.
-        if let Some(judged) = Judged::of(job.asked(), rehearsal, monitor)? {
-            sure.conformance = Some(judged.conformance(0.0)?);
-            sure.fan = Some(judged.fan(0.0)?);
-        }
-    }
-    Ok((driven, sure))
-}
-
-/// The cuts of a job, the last one aimed as the job says, and by how much that shifts its command, um.
-fn cuts_at_aim<'a>(
-    job: &'a Job,
-    grid: &Grid,
-    acting: &'a Acting,
-    look: &mut dyn FnMut(&Grid, &Stage, usize),
-    monitor: &dyn Monitor,
-) -> Result<(Driven<'a>, f64), Failure> {
-    let driven = drive(job, grid, acting, 0.0, look, monitor)?;
-    if job.aim == (Aim::Nominal {}) {
-        return Ok((driven, 0.0));
-    }
-    let judged = match &driven.rehearsal {
-        Some(rehearsal) => Judged::of(job.asked(), rehearsal, monitor)?,
-        None => None,
-    };
-    let aim_um = match judged {
-        Some(judged) => judged.aim_um(&job.aim)?,
-        None => job.tolerance.size().middle_um().unwrap_or(0.0),
-    };
-    Ok((drive(job, grid, acting, aim_um, &mut |_, _, _| (), monitor)?, aim_um))
 }
 
 /// What an outcome is put together from.
@@ -405,7 +359,7 @@ const CODES: Codes = Codes {
         model::second_order::WARNING_CODES,
         force::WARNING_CODES,
     ],
-    explanations: &[answer::advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES],
+    explanations: &[answer::advice::EXPLANATION_CODES, diameters::EXPLANATION_CODES, diameters::OTHER_CUTS_CODES],
     stages: &[&["stage_pass", "stage_advice", "stage_done"]],
     labels: &[
         answer::picture::LABEL_CODES,

@@ -325,7 +325,7 @@ impl<'a> Judged<'a> {
     }
 
     /// The probability of all limits, within bounds the least.
-    pub(super) fn least_found(&self, shift_um: f64) -> Result<Estimate, Failure> {
+    pub(crate) fn least_found(&self, shift_um: f64) -> Result<Estimate, Failure> {
         match self.extremes(shift_um)? {
             Some(extremes) => Ok(self.with(self.uncertainties.held(&extremes.least))?.found(shift_um)?.of[JOINT]),
             None => Ok(self.found(shift_um)?.of[JOINT]),

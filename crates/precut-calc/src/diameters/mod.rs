@@ -23,7 +23,7 @@ pub use limits::{Aim, GaugeUncertainty, Tolerance, Uncertainty};
 pub(crate) use places::Places;
 pub(crate) use quantities::{CODES, DOUBT_LABELS, check};
 pub use quantities::{DeflectionCorrelation, DeflectionQuantity, DeflectionUncertainQuantity};
-pub(crate) use said::{EXPLANATION_CODES, WARNING_CODES, said, warnings};
+pub(crate) use said::{EXPLANATION_CODES, OTHER_CUTS_CODES, WARNING_CODES, said, warnings};
 
 use crate::calculator::Failure;
 use crate::effects::DeflectionEffect;

@@ -7,6 +7,9 @@ use super::{Asked, acceptance};
 
 /// Codes of what is said here.
 pub(crate) const EXPLANATION_CODES: &[&str] = &["probably_good", "first_part_tells", "aim_tells", "accept_between"];
+/// Codes of what is said of other cuts, where these are tried.
+pub(crate) const OTHER_CUTS_CODES: &[&str] =
+    &["lower_feed_tells", "shallower_last_pass_tells", "steady_rest_tells", "centre_tells"];
 /// Codes of the warnings made here.
 pub(crate) const WARNING_CODES: &[&str] = &["improbable", "gauge_too_uncertain"];
 
@@ -35,6 +38,24 @@ pub(crate) fn said(conformance: &Conformance) -> Vec<Message> {
             .with("expected_um", expected_um)
             .with("shift_um", shift_as_expected_um)
             .with("shift_um_per_um", shift_um_per_um)
+            .with("percent", 100.0 * joint_probability),
+        Improvement::LowerFeed { feed_mm_per_rev, joint_probability, .. } => Message::new("lower_feed_tells")
+            .with("feed_mm_per_rev", feed_mm_per_rev)
+            .with("percent", 100.0 * joint_probability),
+        Improvement::ShallowerLastPass { diameter_mm, joint_probability, .. } => {
+            Message::new("shallower_last_pass_tells")
+                .with("diameter_mm", diameter_mm)
+                .with("percent", 100.0 * joint_probability)
+        }
+        Improvement::AddSteadyRest { z_mm, compliance_um_per_n, joint_probability, .. } => {
+            Message::new("steady_rest_tells")
+                .with("z_mm", z_mm)
+                .with("compliance_um_per_n", compliance_um_per_n)
+                .with("percent", 100.0 * joint_probability)
+        }
+        Improvement::AddCentre { z_mm, compliance_um_per_n, joint_probability, .. } => Message::new("centre_tells")
+            .with("z_mm", z_mm)
+            .with("compliance_um_per_n", compliance_um_per_n)
             .with("percent", 100.0 * joint_probability),
     });
     let accepted = conformance.acceptance.as_ref().map(acceptance::said);

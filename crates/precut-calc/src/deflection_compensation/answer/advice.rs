@@ -171,20 +171,8 @@ pub(in crate::deflection_compensation) fn one_more_rest(
         return Ok(None);
     }
     let chosen = grid.sample(REST_SAMPLES);
-    let mut with_rest = job.clone();
     let (kind, z_mm) = placed(job, z_mm);
-    let mut added = match kind {
-        AddedSupport::SteadyRest => Support::SteadyRest {
-            z_mm,
-            compliance_um_per_n,
-            tangential_compliance_um_per_n: None,
-            one_sided: false,
-            gap_um: 0.0,
-        },
-        AddedSupport::Centre => Support::Centre { z_mm, compliance_um_per_n, tangential_compliance_um_per_n: None },
-    };
-    added.fill(&grid.steps_mm);
-    with_rest.supports.push(added);
+    let with_rest = held_more(job, (kind, z_mm, compliance_um_per_n));
     // With the support other effects may act by default.
     let with_rest = match settled(&with_rest, monitor) {
         Ok((with_rest, _)) => with_rest,
@@ -204,6 +192,27 @@ pub(in crate::deflection_compensation) fn one_more_rest(
     };
     let form = Form::of(&sampled.z_mm, &held.cut.uncompensated_errors_um(&held.radii));
     Ok(form.form_error_um.map(|form_error_um| OneMoreRest { kind, z_mm, compliance_um_per_n, form_error_um }))
+}
+
+/// The same job with one more support at a station, of a compliance.
+pub(in crate::deflection_compensation) fn held_more(
+    job: &Job,
+    (kind, z_mm, compliance_um_per_n): (AddedSupport, f64, f64),
+) -> Job {
+    let mut held = job.clone();
+    let mut added = match kind {
+        AddedSupport::SteadyRest => Support::SteadyRest {
+            z_mm,
+            compliance_um_per_n,
+            tangential_compliance_um_per_n: None,
+            one_sided: false,
+            gap_um: 0.0,
+        },
+        AddedSupport::Centre => Support::Centre { z_mm, compliance_um_per_n, tangential_compliance_um_per_n: None },
+    };
+    added.fill(&job.shaft.ends_mm());
+    held.supports.push(added);
+    held
 }
 
 /// The support that is tried where the shaft gives way most, and its station: a steady rest, or a tailstock at a free end.

@@ -6,12 +6,13 @@ use crate::calculator::{Allowed, Calculator, Consequence, Failure, ForwardModel,
 use crate::diameters::{self, Asked, Uncertainty};
 use crate::effects::DeflectionEffect;
 
+use crate::deflection_compensation::DeflectionCompensation;
+use crate::deflection_compensation::answer::aimed::cuts_at_aim;
 use crate::deflection_compensation::answer::output::Path;
 use crate::deflection_compensation::job::acting::Acting;
 use crate::deflection_compensation::job::grid::Grid;
 use crate::deflection_compensation::job::input::{Detail, IncludeMode, Job};
 use crate::deflection_compensation::measured::run::{CommandedPoint, DeflectionPoint, DeflectionRun};
-use crate::deflection_compensation::{DeflectionCompensation, cuts_at_aim};
 
 /// Places along every diameter at which the turned shaft is looked at, beside the corners of the path: a half-wave between
 /// them is missed by less than 0.03 % of its height, (pi/128)^2/2.
