@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use crate::draw::Draw;
-use crate::fixture_support::{checked, outcome, with};
+use crate::fixture_support::{checked, outcome, said, solve, with};
 use precut_calc::fixture_stability::{FixtureOutcome, multiplier_modulus};
 use serde_json::{Value, json};
 
@@ -14,10 +14,11 @@ pub(crate) fn reference(name: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// The job of a case as it is meant: what it states alone is uncertain, its friction is one number.
+/// The job of a case as it is meant: what it states alone is uncertain, its friction is one number. The vise itself is asked.
 pub(crate) fn meant(case: &Value) -> Value {
     let mut job = case["job"].clone();
     job["uncertainty"]["defaults"] = json!(false);
+    job["uncertainty"]["check"] = json!("always");
     if let Some(friction) = job.pointer("/fixture/clamp/friction").cloned() {
         job["fixture"]["clamp"]["friction"] = json!({ "low": friction, "value": friction, "high": friction });
     }
@@ -120,6 +121,20 @@ fn nothing_uncertain_says_nothing() {
     let mut job = meant(&reference("x1-stable"));
     job["uncertainty"] = json!({ "defaults": false });
     assert!(outcome(&job).conformance.is_none());
+}
+
+/// What a response surface tells at once is said to be unchecked, and is off by no more than it says wherever it is checked as it advises.
+#[test]
+fn a_surface_tells_that_nobody_checked_it() {
+    for depth in [2.4, 3.11, 3.55, 3.9] {
+        let always = with(&meant(&reference("x2-joints-and-slip")), "/cut/depth_mm", json!(depth));
+        let never = with(&always, "/uncertainty/check", json!("never"));
+        let is_unchecked = |job: &Value| said(&solve(job), "probability_unchecked").is_some();
+        assert!(is_unchecked(&never) && !is_unchecked(&always));
+        let [(real, of_real), (told, of_told)] = [&always, &never].map(|job| told(&outcome(job), "all"));
+        eprintln!("{depth} mm: {told} +- {of_told}, checked {real} +- {of_real}");
+        assert!((real - told).abs() <= of_real + of_told, "{depth}: {told} +- {of_told}, {real} +- {of_real}");
+    }
 }
 
 /// Vises drawn as the job states, each asked for its own multiplier, forced motion and slip.

@@ -168,18 +168,29 @@ impl<'a, Q: Quantity, const K: usize, const S: usize> Around<'a, Q, K, S> {
         Ok(found)
     }
 
+    /// The same by the response surface alone. How far off that is nobody has tried: as its error stands what its bends make of the
+    /// probability, the last order that it has, where that is more than the error of the lines.
+    pub(crate) fn by_surface(&self) -> Result<Found<S>, Failure> {
+        let (mut found, straight) = (self.by_model(true)?, self.by_model(false)?);
+        for (one, straight) in found.of.iter_mut().zip(straight.of) {
+            one.error = one.error.max((one.probability - straight.probability).abs());
+        }
+        Ok(Found { lines: 0, ..found })
+    }
+
+    fn by_model(&self, is_bent: bool) -> Result<Found<S>, Failure> {
+        let of = self.asked.uncertainties;
+        self.question(self.asked.most_lines[0]).of(&mut |g: &[f64]| Ok(self.near(of, g, is_bent)))
+    }
+
     /// The probability of all limits by the response surface alone.
     pub(crate) fn nearly(&self) -> Result<f64, Failure> {
-        let of = self.asked.uncertainties;
-        let mut near = |g: &[f64]| Ok(self.near(of, g, true));
-        Ok(self.question(self.asked.most_lines[0]).of(&mut near)?.of[S - 1].probability)
+        Ok(self.by_model(true)?.of[S - 1].probability)
     }
 
     /// The probability of all limits by a straight model.
     pub(crate) fn linear_probability(&self) -> Result<f64, Failure> {
-        let of = self.asked.uncertainties;
-        let mut near = |g: &[f64]| Ok(self.near(of, g, false));
-        Ok(self.question(self.asked.most_lines[0]).of(&mut near)?.of[S - 1].probability)
+        Ok(self.by_model(false)?.of[S - 1].probability)
     }
 
     /// The probability of all limits by the real model alone, on so many lines of a scrambling.

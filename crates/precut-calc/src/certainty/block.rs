@@ -1,5 +1,8 @@
 //! The block `uncertainty` of a job: one shape for every calculator, whose quantities are its own.
 
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::calculator::Violations;
 
 use super::{
@@ -47,6 +50,19 @@ pub(crate) trait Block {
     }
 }
 
+/// When a probability is checked on the real model; elsewhere a response surface about the stated values tells it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProbabilityCheck {
+    /// Where that is expected to take no longer than 50 ms, and with the analysis `certainty`.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// With the analysis `certainty` alone.
+    Never,
+}
+
 /// Declares the block of a calculator with the names that its contract has: the block, a quantity with its distribution, and a
 /// correlation.
 macro_rules! uncertainty_block {
@@ -60,6 +76,7 @@ macro_rules! uncertainty_block {
             defaults;
             $(#[$wanted:meta])*
             wanted_probability;
+            $(check: $check:ty;)?
         }
     ) => {
         $(#[$about])*
@@ -93,6 +110,12 @@ macro_rules! uncertainty_block {
             #[serde(default = "crate::certainty::block::one")]
             #[schema(minimum = 0, maximum = 100_000_000, default = 1, example = 1, extensions(("x-unit" = json!("1")), ("x-symbol" = json!("seed"))))]
             pub seed: u32,
+            $(
+                /// Whether the probability is checked on the real model.
+                #[serde(default)]
+                #[schema(default = "auto", example = "always", extensions(("x-advanced" = json!(true))))]
+                pub check: $check,
+            )?
         }
 
         impl Default for $block {
@@ -105,6 +128,7 @@ macro_rules! uncertainty_block {
                     defaults: yes(),
                     wanted_probability: nineteen_of_twenty(),
                     seed: one(),
+                    $(check: <$check>::default(),)?
                 }
             }
         }

@@ -8,6 +8,17 @@ use super::bounds::Extremes;
 use super::lines::Margins;
 use super::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Quantity, Uncertainties, bounded};
 
+/// How far a probability that is told is checked on the real model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Check {
+    /// Not at all: a response surface tells it.
+    None,
+    /// On lines.
+    OnLines,
+    /// On lines, and half of the width of every quantity on so many lines of a scrambling.
+    WithHalves(usize),
+}
+
 /// A cut with `K` limits, of which `S` sets are asked; it may be tried at another place.
 pub(crate) trait Judging<const K: usize, const S: usize>: Sized {
     /// What may be uncertain in it.
@@ -63,25 +74,26 @@ pub(crate) trait Judging<const K: usize, const S: usize>: Sized {
         self.with(self.uncertainties().held(places))
     }
 
-    /// What is told of a place, within bounds at the least probability. `compared` is the number of lines of a scrambling on which half
-    /// of a width is tried; none where nobody asked.
-    fn told(&self, at: Self::At, wanted: f64, compared: Option<usize>) -> Result<Told, Failure> {
+    /// What is told of a place, within bounds at the least probability.
+    fn told(&self, at: Self::At, wanted: f64, check: Check) -> Result<Told, Failure> {
         let Some(Extremes { least, most, search }) = self.extremes(at)? else {
-            return self.told_alone(at, wanted, compared);
+            return self.told_alone(at, wanted, check);
         };
-        let told = self.held(&least).told_alone(at, wanted, compared)?;
-        let most = self.held(&most).alone(at, Self::MOST_LINES)?;
+        let told = self.held(&least).told_alone(at, wanted, check)?;
+        let most = self.held(&most);
+        let most = if check == Check::None { most.nearly(at)? } else { most.alone(at, Self::MOST_LINES)? };
         Ok(Told { joint: told.joint.least(most, search), ..told })
     }
 
     /// The same with the quantities between bounds where they are.
-    fn told_alone(&self, at: Self::At, wanted: f64, compared: Option<usize>) -> Result<Told, Failure> {
+    fn told_alone(&self, at: Self::At, wanted: f64, check: Check) -> Result<Told, Failure> {
         let real = self.real(at)?;
         let asked = self.asked(&real, Self::MOST_LINES);
         let (limits, seed) = (asked.limits, asked.seed);
         let around = Around::of(asked)?;
-        let found = around.found()?;
+        let found = if check == Check::None { around.by_surface()? } else { around.found()? };
         let joint = JointlyKept::of(found.of[S - 1], wanted);
+        let compared = if let Check::WithHalves(lines) = check { Some(lines) } else { None };
         let mut contributions = around.contributions(&found, compared)?;
         let at_half = &mut |of: &Uncertainties<Self::Of>| self.with(of.clone()).nearly(at);
         contributions.extend(self.uncertainties().contributions_within(joint.probability, at_half)?);

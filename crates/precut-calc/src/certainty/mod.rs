@@ -25,6 +25,7 @@ pub use answer::{
     SeveralParts,
 };
 pub(crate) use answer::{improbable, probably, with_largest, with_most};
+pub use block::ProbabilityCheck;
 pub(crate) use block::{Block, uncertainty_block};
 pub(crate) use distribution::{CODES as DISTRIBUTION_CODES, WidthUnit};
 pub use distribution::{Distribution, Level, Source};

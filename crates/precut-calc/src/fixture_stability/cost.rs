@@ -1,6 +1,8 @@
 //! What a job will take.
 
 use crate::calculator::Cost;
+use crate::certainty::ProbabilityCheck;
+use crate::certainty::judging::Check;
 
 use crate::fixture_stability::answer::probable_depths::{BOUNDARIES, LEAST_SPEEDS, scales};
 use crate::fixture_stability::job::acting::Case;
@@ -29,8 +31,11 @@ const PIECE_MS: f64 = 0.0005;
 const RANGE: u32 = 16;
 /// Multipliers of a speed of a boundary.
 const OF_BOUNDARY: f64 = 45.0;
-/// Vises that are tried for a probability; probabilities that are found for the analysis `certainty`.
-const VISES: f64 = 300.0;
+/// Vises that are tried for a probability, and for one that a response surface tells, with what that costs besides, ms;
+/// probabilities that are found for the analysis `certainty`.
+const VISES: f64 = 2800.0;
+const VISES_OF_SURFACE: f64 = 30.0;
+const SURFACE_MS: f64 = 10.0;
 const PROBABILITIES: f64 = 30.0;
 /// How much longer a vise takes whose forced motion is found by Newton's method, in multipliers.
 const NOT_LINEAR: f64 = 20.0;
@@ -79,8 +84,8 @@ impl<'a> Points<'a> {
         (0.008 + per_point * self.history(spindle_rpm)) * (0.5 + 0.25 * self.case.holding.states() as f64)
     }
 
-    /// A probability at the working point.
-    fn probability_ms(&self) -> f64 {
+    /// A vise that is tried at the working point.
+    fn vise_ms(&self) -> f64 {
         let case = self.case;
         let forced = if !case.is_linear() {
             NOT_LINEAR
@@ -89,13 +94,27 @@ impl<'a> Points<'a> {
         } else {
             0.0
         };
-        VISES * (1.0 + forced) * self.multiplier_ms(case.working.spindle_rpm)
+        (1.0 + forced) * self.multiplier_ms(case.working.spindle_rpm)
+    }
+
+    /// A probability at the working point.
+    fn probability_ms(&self, check: Check) -> f64 {
+        match check {
+            Check::None => SURFACE_MS + VISES_OF_SURFACE * self.vise_ms(),
+            Check::OnLines | Check::WithHalves(_) => VISES * self.vise_ms(),
+        }
     }
 }
 
-/// Whether the probability is told although nobody asked for the analysis `certainty`.
-pub(in crate::fixture_stability) fn tells_probability(case: &Case) -> bool {
-    Points::new(case).probability_ms() <= UNASKED_MS
+/// How the probability is found that is told without the analysis `certainty`; `None` where even a response surface takes too long.
+pub(in crate::fixture_stability) fn without_analysis(case: &Case, asked_for: ProbabilityCheck) -> Option<Check> {
+    let points = Points::new(case);
+    let is_soon = |check: &Check| points.probability_ms(*check) <= UNASKED_MS;
+    match asked_for {
+        ProbabilityCheck::Always => Some(Check::OnLines),
+        ProbabilityCheck::Auto => [Check::OnLines, Check::None].into_iter().find(is_soon),
+        ProbabilityCheck::Never => Some(Check::None).filter(is_soon),
+    }
 }
 
 /// Expected work. A step in time takes 12 ns (a plain vise, linear law) to 60 ns (joints that open, a power of the chip, kept
@@ -153,13 +172,13 @@ pub(in crate::fixture_stability) fn cost(job: &FixtureJob) -> Cost {
         }
     }
     if job.asks(Analysis::Certainty) {
-        parts.push((PROBABILITIES * points.probability_ms(), "/analyses"));
+        parts.push((PROBABILITIES * points.probability_ms(Check::OnLines), "/analyses"));
         if scales(&case) {
             let traced = BOUNDARIES as f64 * speeds.max(LEAST_SPEEDS as f64);
             parts.push((traced * OF_BOUNDARY * mean_ms, "/lobes/speeds"));
         }
-    } else if tells_probability(&case) {
-        parts.push((points.probability_ms(), "/uncertainty"));
+    } else if let Some(check) = without_analysis(&case, job.uncertainty.check) {
+        parts.push((points.probability_ms(check), "/uncertainty"));
     }
     let ms = parts.iter().map(|(ms, _)| ms).sum();
     let driver = parts.iter().max_by(|a, b| a.0.total_cmp(&b.0)).map_or("/cut", |(_, driver)| driver);

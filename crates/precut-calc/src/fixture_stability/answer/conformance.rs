@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
-use crate::certainty::judging::{Judging, Told};
+use crate::certainty::judging::{Check, Judging, Told};
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 
@@ -32,7 +32,8 @@ const SETS: [Together; LIMITS + 1] = [STABLE..=STABLE, CLOSED..=CLOSED, HELD..=H
 const COMPARED_LINES: usize = 4;
 
 /// Codes of what is said here.
-pub(in crate::fixture_stability) const EXPLANATION_CODES: &[&str] = &["probably_quiet", "probably_quiet_depth"];
+pub(in crate::fixture_stability) const EXPLANATION_CODES: &[&str] =
+    &["probably_quiet", "probably_quiet_depth", "probability_unchecked"];
 /// Codes of the warnings made here.
 pub(crate) const WARNING_CODES: &[&str] = &["improbable_cut"];
 
@@ -107,19 +108,18 @@ impl<'a> Judged<'a> {
         Ok(margins)
     }
 
-    /// The block of the answer. `deepest_mm` where a depth is looked for, too, and how deep.
-    pub(in crate::fixture_stability) fn conformance(
-        &self,
-        deepest_mm: Option<f64>,
-    ) -> Result<FixtureConformance, Failure> {
+    /// The block of the answer, with the depth of the wanted probability up to `deepest_mm`.
+    pub(in crate::fixture_stability) fn asked_for(&self, deepest_mm: f64) -> Result<FixtureConformance, Failure> {
         let (working, wanted) = (self.case.working, self.job.uncertainty.wanted_probability);
-        let Told { limits, joint, contributions, method } =
-            self.told(working, wanted, deepest_mm.map(|_| COMPARED_LINES))?;
-        let depth_at_wanted_mm = match deepest_mm {
-            Some(deepest_mm) => self.depth_mm(working, wanted, deepest_mm)?,
-            None => None,
-        };
-        Ok(FixtureConformance { limits, joint, contributions, depth_at_wanted_mm, method })
+        let conformance = self.conformance(Check::WithHalves(COMPARED_LINES))?;
+        Ok(FixtureConformance { depth_at_wanted_mm: self.depth_mm(working, wanted, deepest_mm)?, ..conformance })
+    }
+
+    /// The block of the answer without that depth.
+    pub(in crate::fixture_stability) fn conformance(&self, check: Check) -> Result<FixtureConformance, Failure> {
+        let wanted = self.job.uncertainty.wanted_probability;
+        let Told { limits, joint, contributions, method } = self.told(self.case.working, wanted, check)?;
+        Ok(FixtureConformance { limits, joint, contributions, depth_at_wanted_mm: None, method })
     }
 
     /// Deepest cut up to `most_mm` with which all limits are kept with a probability; `None` where not even a thousandth of it is.
@@ -172,10 +172,12 @@ impl Judging<LIMITS, { LIMITS + 1 }> for Judged<'_> {
 
 /// What is said of it.
 pub(in crate::fixture_stability) fn said(conformance: &FixtureConformance) -> Vec<Message> {
-    let FixtureConformance { limits, joint, contributions, .. } = conformance;
+    let FixtureConformance { limits, joint, contributions, method, .. } = conformance;
     let first = probably("probably_quiet", joint, limits, contributions);
     let deep = conformance.depth_at_wanted_mm.map(|depth_mm| quiet_to(depth_mm, joint));
-    std::iter::once(first).chain(deep).collect()
+    let unchecked = (!method.is_checked())
+        .then(|| Message::new("probability_unchecked").with("error_percent", 100.0 * joint.numerical_error));
+    std::iter::once(first).chain(unchecked).chain(deep).collect()
 }
 
 /// How deep one may cut with the wanted probability.

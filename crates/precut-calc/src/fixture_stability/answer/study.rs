@@ -17,7 +17,7 @@ use crate::fixture_stability::answer::parts::plane_of;
 use crate::fixture_stability::answer::picture::lobes_so_far;
 use crate::fixture_stability::answer::probable_depths::{ProbableDepths, probable_depths};
 use crate::fixture_stability::answer::speeds::{ForcedLimits, better_speeds, first_of, forced_limits};
-use crate::fixture_stability::cost::tells_probability;
+use crate::fixture_stability::cost::without_analysis;
 use crate::fixture_stability::job::acting::Case;
 use crate::fixture_stability::job::input::{Analysis, FixtureJob};
 use crate::fixture_stability::model::drive::{self, DriveDepths};
@@ -299,15 +299,15 @@ pub(in crate::fixture_stability) fn outcome(study: &Study<'_>) -> Result<(Fixtur
 /// How probable it is that the cut stays quiet, and how deep one may cut with the wanted probability where that is asked.
 fn certainty(study: &Study<'_>) -> Result<(Option<FixtureConformance>, Option<ProbableDepths>), Failure> {
     let Study { job, case, monitor, .. } = study;
-    let asked = job.asks(Analysis::Certainty);
-    if !asked && !tells_probability(case) {
-        return Ok((None, None));
-    }
     let Some(judged) = Judged::of(job, case, &study.rules, *monitor)? else { return Ok((None, None)) };
     monitor.progress(0.995, Message::new("stage_certainty"));
-    let conformance = judged.conformance(asked.then_some(study.examined_mm))?;
-    let depths = if asked { probable_depths(study, &judged)? } else { None };
-    Ok((Some(conformance), depths))
+    if job.asks(Analysis::Certainty) {
+        let conformance = judged.asked_for(study.examined_mm)?;
+        return Ok((Some(conformance), probable_depths(study, &judged)?));
+    }
+    let conformance =
+        without_analysis(case, job.uncertainty.check).map(|check| judged.conformance(check)).transpose()?;
+    Ok((conformance, None))
 }
 
 fn engagement(study: &Study<'_>) -> Engagement {

@@ -5,8 +5,8 @@ use utoipa::ToSchema;
 
 use crate::calculator::{Failure, Violations};
 use crate::certainty::{
-    Block, Contradiction, Distribution, Level, OpenEffects, Quantity, Uncertainties, WidthUnit, check_brought, open,
-    uncertainty_block,
+    Block, Contradiction, Distribution, Level, OpenEffects, ProbabilityCheck, Quantity, Uncertainties, WidthUnit,
+    check_brought, open, uncertainty_block,
 };
 use crate::effects::{FixtureEffect, JointUncertainty};
 
@@ -129,6 +129,7 @@ uncertainty_block! {
         defaults;
         /// Probability of a quiet cut that is wanted; below it the answer warns.
         wanted_probability;
+        check: ProbabilityCheck;
     }
 }
 

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Failure, Finding, Message};
 use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
-use crate::certainty::judging::{Judging, Told};
+use crate::certainty::judging::{Check, Judging, Told};
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 use crate::clamping::Load;
@@ -49,8 +49,8 @@ const SETS: [Together; LIMITS + 1] = [
 const COMPARED_LINES: usize = 4;
 /// Draws of the real model that an answer takes, roughly: lines of the answer itself, of a depth that is tried, and of a quantity of
 /// half a width.
-const DRAWS: f64 = 3000.0;
-const DRAWS_TRIED: f64 = 500.0;
+const DRAWS: f64 = 5000.0;
+const DRAWS_TRIED: f64 = 1300.0;
 const DRAWS_COMPARED: f64 = 600.0;
 const DEPTHS_TRIED: f64 = 6.0;
 
@@ -90,7 +90,8 @@ pub(super) fn conformance(study: &Study<'_>) -> Result<Option<MillingConformance
     let Some(judged) = Judged::new(study)? else { return Ok(None) };
     let depth_mm = study.case.depth_mm;
     let wanted = study.job.uncertainty.wanted_probability;
-    let Told { limits, joint, contributions, method } = judged.told(depth_mm, wanted, Some(COMPARED_LINES))?;
+    let Told { limits, joint, contributions, method } =
+        judged.told(depth_mm, wanted, Check::WithHalves(COMPARED_LINES))?;
     let mut probability = |depth_mm: f64| judged.probability(depth_mm);
     let depth_at_wanted_mm = deepest_mm(depth_mm, study.examined_mm, wanted, &mut probability)?;
     Ok(Some(MillingConformance { limits, joint, contributions, depth_at_wanted_mm, method }))
