@@ -13,6 +13,8 @@ use crate::diagnosis::statistics::whiten::White;
 const WITH_REMAINDER: usize = 5;
 /// Prior of the remainder beside a set, relative to the set.
 const REMAINDER_PRIOR: f64 = 0.08;
+/// Where nothing leads, a pair that is foretold so much less weight, as a logarithm, will not matter: 1 in 150.
+const HOPELESS: f64 = 5.0;
 /// By so much less a fit with free shapes may explain than the mean over their grid, and is taken all the same.
 const PRICE_OF_SHAPES: f64 = 2.0;
 
@@ -174,6 +176,9 @@ impl Ranking {
             pairs.extend(most.map(|(log_z, start)| (log_z, index, start)));
         }
         let weight = |pair: &(f64, usize, Start)| pair.0 + self.candidates[pair.1].log_prior;
+        if let Some(nothing) = self.candidates.first().filter(|leader| leader.members.is_empty()) {
+            pairs.retain(|pair| weight(pair) > nothing.log_weight() - HOPELESS);
+        }
         pairs.sort_by(|a, b| weight(b).total_cmp(&weight(a)).then(a.1.cmp(&b.1)));
         pairs.truncate(count);
         let indices = pairs.iter().map(|(_, index, _)| *index).collect();

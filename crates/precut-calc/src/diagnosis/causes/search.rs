@@ -1,6 +1,6 @@
 //! Which sets of causes explain the rows, all from one matrix of inner products (`diagnosis/3.4`).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -208,9 +208,16 @@ impl<'a> Linear<'a> {
             let with = evidence(Some(v))?;
             Some((with.log_z + self.log_share(hypothesis, v), v, with.t))
         };
-        let all: Vec<_> = (0..self.variants(hypothesis).len()).filter_map(weighed).collect();
-        let gain = log_sum_exp(&all.iter().map(|tried| tried.0).collect::<Vec<_>>()) - alone.log_z;
-        let (_, v, t) = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // Of several places of one point that counts which explains most.
+        let mut of_cells: BTreeMap<usize, (f64, usize, Vec<f64>)> = BTreeMap::new();
+        for tried in (0..self.variants(hypothesis).len()).filter_map(weighed) {
+            let cell = of_cells.entry(self.cell(&[hypothesis], &[tried.1])).or_insert_with(|| tried.clone());
+            if tried.0 > cell.0 {
+                *cell = tried;
+            }
+        }
+        let gain = log_sum_exp(&of_cells.values().map(|tried| tried.0).collect::<Vec<_>>()) - alone.log_z;
+        let (_, v, t) = of_cells.into_values().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let (of_fit, own) = t.split_at_checked(fit.free.len())?;
         let (members, variants) = ([hypothesis], [v]);
         let about = self.variant(hypothesis, v).setting.clone();

@@ -52,21 +52,16 @@ impl PreparedFixture {
         Ok(1.0)
     }
 
-    /// Margins of rows at one working point; each is computed once.
+    /// Margins of rows at one working point, that of chatter given; the other is computed once.
     pub(in crate::fixture_stability) fn margins(
         &self,
         case: &Case,
         rows: &[usize],
-        steepness: f64,
+        chatter: Prediction,
         unit: &mut Option<Response>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<(usize, Prediction)>, Failure> {
         let asks = |margin: RegimeMargin| rows.iter().any(|&row| self.rows[row].margin == margin);
-        let chatter = if asks(RegimeMargin::Chatter) {
-            or_missing(self.log_modulus(case, case.working, monitor))?.map(|ln| -ln / steepness)
-        } else {
-            Err(Missing::NoSolution)
-        };
         let opening =
             if asks(RegimeMargin::Opening) { opening(case, unit, monitor)? } else { Err(Missing::NoSolution) };
         let of = |row: usize| match self.rows[row].margin {

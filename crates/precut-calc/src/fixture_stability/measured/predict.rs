@@ -14,8 +14,7 @@ use crate::fixture_stability::job::input::FixtureJob;
 use crate::fixture_stability::measured::forward::{Measure, RegimeMargin};
 use crate::fixture_stability::measured::margins::or_missing;
 use crate::fixture_stability::model::floquet::Working;
-use crate::fixture_stability::model::holding::Closed;
-use crate::fixture_stability::model::lobes::{Rules, critical_depth, point};
+use crate::fixture_stability::model::lobes::{Rules, critical_depth, smooth_moduli};
 use crate::fixture_stability::model::simulate::{count, plan, run as simulate, steps_per_tooth};
 
 /// Step of a difference over time, s: below a tenth of a period of any vise.
@@ -138,51 +137,84 @@ impl PreparedFixture {
             by_depth.entry(self.rows[row].working.depth_mm.to_bits()).or_default().push(row);
         }
         let (mut unit, mut unit_mm) = (None, None);
+        let mut moduli = self.moduli(&case, &by_depth, ask)?.into_iter();
         let mut predicted = Vec::with_capacity(rows.len());
         for rows in by_depth.into_values() {
             let working = self.rows[rows[0]].working;
             let case = Case { working, ..case.clone() };
-            if self.measure == Measure::Displacement {
-                predicted.extend(self.history(&case, &rows, ask)?);
-                continue;
-            }
-            if self.measure == Measure::Regime {
-                predicted.extend(self.margins(&case, &rows, self.steepness[group], &mut unit, ask.monitor)?);
-                continue;
-            }
-            let prediction = match self.measure {
-                Measure::PeakToPeak | Measure::Regime | Measure::Displacement => {
-                    self.peak_to_peak(&case, &mut unit_mm, ask)?
+            let modulus = moduli.next().unwrap_or(Err(Missing::NoSolution));
+            match self.measure {
+                Measure::Displacement => predicted.extend(self.history(&case, &rows, modulus, ask)?),
+                Measure::Regime => {
+                    let chatter = modulus.map(|modulus| -modulus.ln() / self.steepness[group]);
+                    predicted.extend(self.margins(&case, &rows, chatter, &mut unit, ask.monitor)?);
+                }
+                Measure::PeakToPeak => {
+                    let prediction = self.peak_to_peak(&case, &mut unit_mm, modulus, ask)?;
+                    predicted.extend(rows.into_iter().map(|row| (row, prediction)));
                 }
                 Measure::DepthLimit => {
                     let most = 4.0 * working.depth_mm.max(2.5);
-                    or_missing(critical_depth(&self.rules, &case.holding, &case.cutting, working, most, ask.monitor))?
-                        .and_then(|limit| limit.depth_mm.ok_or(Missing::NoSolution))
+                    let limit = critical_depth(&self.rules, &case.holding, &case.cutting, working, most, ask.monitor);
+                    let prediction = or_missing(limit)?.and_then(|limit| limit.depth_mm.ok_or(Missing::NoSolution));
+                    predicted.extend(rows.into_iter().map(|row| (row, prediction)));
                 }
-            };
-            predicted.extend(rows.into_iter().map(|row| (row, prediction)));
+            }
         }
         Ok(predicted)
     }
 
-    /// Why a point has no amplitude, where it has none: it chatters, or there is no motion to ask about.
-    fn instability(&self, case: &Case, monitor: &dyn Monitor) -> Result<Option<Missing>, Failure> {
-        let found = point(&self.rules, &case.holding, &case.cutting, case.working, Closed::BOTH, monitor);
-        Ok(match or_missing(found)? {
-            Ok(point) => point.multiplier.grows().then_some(Missing::Unstable),
-            Err(missing) => Some(missing),
-        })
+    /// |mu| at every depth of a speed; where nobody asks for it 0. It is that of maps, off by 2e-5 near 1.
+    fn moduli(
+        &self,
+        case: &Case,
+        by_depth: &BTreeMap<u64, Vec<usize>>,
+        ask: Ask<'_>,
+    ) -> Result<Vec<Prediction>, Failure> {
+        let is_asked = match self.measure {
+            Measure::Regime => true,
+            Measure::PeakToPeak | Measure::Displacement => ask.whether_stable,
+            Measure::DepthLimit => false,
+        };
+        if !is_asked {
+            return Ok(vec![Ok(0.0); by_depth.len()]);
+        }
+        // Where no margin of chatter is asked of a depth its modulus is not, either.
+        let asks = |rows: &[usize]| {
+            self.measure != Measure::Regime || rows.iter().any(|&row| self.rows[row].margin == RegimeMargin::Chatter)
+        };
+        let asked_mm: Vec<f64> =
+            by_depth.iter().filter(|(_, rows)| asks(rows)).map(|(bits, _)| f64::from_bits(*bits)).collect();
+        let Case { holding, cutting, working, .. } = case;
+        let found = |depths_mm: &[f64]| {
+            or_missing(smooth_moduli(&self.rules, holding, cutting, *working, depths_mm, ask.monitor))
+        };
+        // Where one depth has no solution the others may have theirs.
+        let each: Vec<Prediction> = match found(&asked_mm)? {
+            Ok(moduli) => moduli.into_iter().map(Ok).collect(),
+            Err(_) => asked_mm.iter().map(|&mm| Ok(found(&[mm])?.map(|one| one[0]))).collect::<Result<_, Failure>>()?,
+        };
+        let mut each = each.into_iter();
+        let mut next = || {
+            let modulus = each.next().unwrap_or(Err(Missing::NoSolution));
+            modulus.and_then(|modulus| if modulus.is_nan() { Err(Missing::NoSolution) } else { Ok(modulus) })
+        };
+        Ok(by_depth.values().map(|rows| if asks(rows) { next() } else { Err(Missing::NoSolution) }).collect())
     }
 
     /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit_mm` is
     /// the amplitude at 1 mm of depth, where the motion goes with H^(1-mu).
-    fn peak_to_peak(&self, case: &Case, unit_mm: &mut Option<f64>, ask: Ask<'_>) -> Result<Prediction, Failure> {
+    fn peak_to_peak(
+        &self,
+        case: &Case,
+        unit_mm: &mut Option<f64>,
+        modulus: Prediction,
+        ask: Ask<'_>,
+    ) -> Result<Prediction, Failure> {
         if case.working.depth_mm <= 0.0 {
             return Ok(Err(Missing::NoCut));
         }
-        if ask.whether_stable
-            && let Some(missing) = self.instability(case, ask.monitor)?
-        {
+        if let Some(missing) = instability(modulus) {
             return Ok(Err(missing));
         }
         if !case.is_linear() {
@@ -200,10 +232,14 @@ impl PreparedFixture {
     }
 
     /// x at the times of these rows after the entry: one cut in time, as long as the last row within it asks.
-    fn history(&self, case: &Case, rows: &[usize], ask: Ask<'_>) -> Result<Vec<(usize, Prediction)>, Failure> {
-        if ask.whether_stable
-            && let Some(missing) = self.instability(case, ask.monitor)?
-        {
+    fn history(
+        &self,
+        case: &Case,
+        rows: &[usize],
+        modulus: Prediction,
+        ask: Ask<'_>,
+    ) -> Result<Vec<(usize, Prediction)>, Failure> {
+        if let Some(missing) = instability(modulus) {
             return Ok(rows.iter().map(|&row| (row, Err(missing))).collect());
         }
         let tau = case.cutting.tooth_period_s(case.working.spindle_rpm);
@@ -290,5 +326,13 @@ impl PreparedFixture {
             periods.min(most) * steps_per_tooth(&self.base, rpm) as f64
         };
         last.iter().map(steps).sum()
+    }
+}
+
+/// Why a point has no amplitude, where it has none: it chatters, or there is no motion to ask about.
+fn instability(modulus: Prediction) -> Option<Missing> {
+    match modulus {
+        Ok(modulus) => (modulus >= 1.0).then_some(Missing::Unstable),
+        Err(missing) => Some(missing),
     }
 }

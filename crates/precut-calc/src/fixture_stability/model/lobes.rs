@@ -405,10 +405,12 @@ pub(in crate::fixture_stability) fn moduli(
     depths_mm: &[f64],
     monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Failure> {
-    by_states!(holding, moduli_of(rules, holding, cutting, working, depths_mm, monitor))
+    by_states!(holding, moduli_of(rules, holding, cutting, working, (depths_mm, COARSE_RESIDUAL), monitor))
 }
 
-fn moduli_of<const N: usize>(
+/// The same with eigenvalues as exact as those of single points: what a small change makes of a modulus is that of the model, since the
+/// error of the elements changes as smoothly as they do.
+pub(in crate::fixture_stability) fn smooth_moduli(
     rules: &Rules,
     holding: &Holding,
     cutting: &Cutting,
@@ -416,8 +418,19 @@ fn moduli_of<const N: usize>(
     depths_mm: &[f64],
     monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Failure> {
+    by_states!(holding, moduli_of(rules, holding, cutting, working, (depths_mm, FINE_RESIDUAL), monitor))
+}
+
+fn moduli_of<const N: usize>(
+    rules: &Rules,
+    holding: &Holding,
+    cutting: &Cutting,
+    working: Working,
+    (depths_mm, residual): (&[f64], f64),
+    monitor: &dyn Monitor,
+) -> Result<Vec<f64>, Failure> {
     let system = holding.system::<N>(Closed::BOTH);
-    let column = Column::new(&rules.coarse, &system, holding, cutting, working, COARSE_RESIDUAL, monitor)?;
+    let column = Column::new(&rules.coarse, &system, holding, cutting, working, residual, monitor)?;
     depths_mm.iter().map(|&depth| column.on_map(depth)).collect()
 }
 
