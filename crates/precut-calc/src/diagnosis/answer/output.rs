@@ -21,7 +21,8 @@ pub struct DiagnosisResult<E: ToSchema, R: ToSchema> {
     pub verdict: VerdictClass,
     /// The causes named; for `unknown` those that act at least; empty otherwise.
     pub named: Vec<NamedCause>,
-    /// For `confounded`: the likely sets of causes, likeliest first, which these data cannot tell apart.
+    /// For `confounded`: the likely sets of causes, likeliest first, which these data cannot tell apart. A set that only adds to
+    /// one ten times as likely is not listed (`posterior_with_others`), unless all of them do.
     pub likely_sets: Vec<LikelySet>,
     /// Why nothing is said about physics, for `refused`.
     pub refusal: Option<Refusal>,
@@ -206,6 +207,9 @@ pub struct LikelySet {
     /// Share of the whole posterior.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub posterior: f64,
+    /// Share of all sets of named causes that contain these: that all of them act, whatever else does.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub posterior_with_others: f64,
 }
 
 /// Why the data cannot be judged.

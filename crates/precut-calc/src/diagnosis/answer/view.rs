@@ -139,7 +139,12 @@ impl<'a> View<'a> {
     pub(in crate::diagnosis) fn likely_sets(&self) -> Vec<LikelySet> {
         let Verdict::Confounded(likely) = &self.weighing.verdict else { return Vec::new() };
         let sets = likely.iter().filter_map(|members| self.weighing.named_sets().find(|set| set.members == *members));
-        sets.map(|set| LikelySet { causes: self.set(set), posterior: set.posterior }).collect()
+        let listed = |set: &SetWeight| {
+            let contains = |other: &&SetWeight| set.members.iter().all(|h| other.members.contains(h));
+            let with_others: f64 = self.weighing.named_sets().filter(contains).map(|other| other.posterior).sum();
+            LikelySet { causes: self.set(set), posterior: set.posterior, posterior_with_others: with_others.min(1.0) }
+        };
+        sets.map(listed).collect()
     }
 
     pub(in crate::diagnosis) fn set_report(&self, set: &SetWeight, gain: Option<&Gain>) -> SetReport {
