@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 mod fields;
-mod golden;
 mod hostile_jobs;
 mod invalid_feed_jobs;
 mod invalid_jobs;
