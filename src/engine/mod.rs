@@ -38,7 +38,7 @@ mod watch;
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
 pub use crate::store::callbacks::{Callback, CallbackState, DueCallback, NewCallback, Subject, TakeUp, Tried};
-pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
+pub use crate::store::jobs::{JobId, JobQuery, JobRecord, JobState, Priority};
 pub use answer::{Body, CacheState, Checked, FilePart, Solved, Stored, Timings};
 pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};

@@ -143,14 +143,6 @@ macro_rules! words {
 }
 
 words! {
-    /// What a job computes.
-    JobKind {
-        /// One answer of one calculator.
-        Calculation = "calculation",
-    }
-}
-
-words! {
     /// How far a job is.
     JobState {
         /// It waits.
@@ -230,8 +222,6 @@ pub struct Shard {
 pub struct NewJob {
     /// Its name.
     pub id: JobId,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// Which version of it.
@@ -277,8 +267,6 @@ pub struct Idempotency {
 pub struct JobRecord {
     /// Its name.
     pub id: JobId,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// Address of its result.
@@ -348,8 +336,6 @@ pub struct Claim {
     pub key: Key,
     /// Which shard it is, if it is one: then there is no input but that of its parent.
     pub shard: Option<ShardId>,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// All that is needed.

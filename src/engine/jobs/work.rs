@@ -1,4 +1,4 @@
-//! What a job does when it runs: one arm per [`JobKind`], and shards.
+//! What a job does when it runs.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,7 +18,7 @@ use crate::engine::single_flight::Joined;
 use crate::engine::{Error, Inner, Stored, read};
 use crate::key::Key;
 use crate::registry::Entry;
-use crate::store::jobs::{Claim, Ending, JobKind};
+use crate::store::jobs::{Claim, Ending};
 
 /// Something to run for jobs.
 pub(crate) trait Work: Send + Sync {
@@ -39,23 +39,19 @@ pub(super) fn answer(stored: &Stored) -> Ending {
 
 /// The work of a claimed job, read back from its record.
 pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> {
-    match claim.kind {
-        JobKind::Calculation => {
-            let entry = engine.known(&claim.calculator)?;
-            if let Some(shard) = claim.shard {
-                return Ok(Box::new(OneShard { shard, entry, apart: claim.attempt >= MOST_ATTEMPTS }));
-            }
-            if entry.is_composed() {
-                return Ok(Box::new(Composed { entry, input: claim.input.clone(), key: claim.key }));
-            }
-            let ready = ready(&entry, &claim.input)?;
-            match &engine.settings.isolation {
-                Some(isolation) if claim.attempt >= MOST_ATTEMPTS => {
-                    Ok(Box::new(Isolated { ready, isolation: isolation.clone() }))
-                }
-                _ => Ok(Box::new(Calculation { ready })),
-            }
+    let entry = engine.known(&claim.calculator)?;
+    if let Some(shard) = claim.shard {
+        return Ok(Box::new(OneShard { shard, entry, apart: claim.attempt >= MOST_ATTEMPTS }));
+    }
+    if entry.is_composed() {
+        return Ok(Box::new(Composed { entry, input: claim.input.clone(), key: claim.key }));
+    }
+    let ready = ready(&entry, &claim.input)?;
+    match &engine.settings.isolation {
+        Some(isolation) if claim.attempt >= MOST_ATTEMPTS => {
+            Ok(Box::new(Isolated { ready, isolation: isolation.clone() }))
         }
+        _ => Ok(Box::new(Calculation { ready })),
     }
 }
 

@@ -10,9 +10,7 @@ use super::results::insert;
 use super::shards;
 use crate::key::Key;
 use crate::store::callbacks::Callback;
-use crate::store::jobs::{
-    Claim, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing,
-};
+use crate::store::jobs::{Claim, JobId, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing};
 use crate::store::row::ResultRow;
 use crate::store::sql::{Outcome, Session, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
@@ -21,7 +19,7 @@ use crate::store::sqlite_jobs::pack::PackedEnding;
 macro_rules! records {
     ($rest:literal) => {
         concat!(
-            "SELECT jobs.id, kind, calculator, key, jobs.state, stage, progress, attempt, jobs.lease, priority, problem,
+            "SELECT jobs.id, calculator, key, jobs.state, stage, progress, attempt, jobs.lease, priority, problem,
                  estimate_ms, created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, ",
             told!(),
             " FROM jobs LEFT JOIN callbacks ON callbacks.job = jobs.id WHERE parent IS NULL",
@@ -32,7 +30,6 @@ macro_rules! records {
 
 struct RecordRow {
     id: String,
-    kind: String,
     calculator: String,
     key: Vec<u8>,
     state: String,
@@ -54,7 +51,7 @@ struct RecordRow {
 }
 
 from_row!(RecordRow {
-    id, kind, calculator, key, state, stage, progress, attempt as i32, lease, priority, problem, estimate_ms, created_ms,
+    id, calculator, key, state, stage, progress, attempt as i32, lease, priority, problem, estimate_ms, created_ms,
     started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate
 });
 
@@ -63,7 +60,6 @@ impl RecordRow {
         Ok(JobRecord {
             callback,
             id: parsed(&self.id)?,
-            kind: JobKind::of_word(&self.kind).ok_or_else(|| unreadable("kind"))?,
             calculator: self.calculator,
             key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
             state: JobState::of_word(&self.state).ok_or_else(|| unreadable("state"))?,
@@ -187,7 +183,6 @@ pub(in crate::store) struct Runnable {
     pub(in crate::store) id: String,
     pub(in crate::store) key: Vec<u8>,
     pub(in crate::store) state: String,
-    kind: String,
     pub(in crate::store) calculator: String,
     pub(in crate::store) attempt: u32,
     /// None where another one has the same.
@@ -203,7 +198,7 @@ pub(in crate::store) struct Runnable {
 }
 
 from_row!(Runnable {
-    id, key, state, kind, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate,
+    id, key, state, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate,
     parent, shard
 });
 
@@ -224,7 +219,6 @@ impl Runnable {
             jobs,
             key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
             shard: self.shard()?,
-            kind: JobKind::of_word(&self.kind).ok_or_else(|| unreadable("kind"))?,
             calculator: self.calculator,
             input: unpacked(&self.input.unwrap_or_default()),
             attempt: self.attempt,

@@ -99,15 +99,15 @@ pub(super) async fn submit(
     let priority = rank(job.priority);
     let turn = facts.first.map_or(0, |first| first + 1) + facts.own + yields_to(job.estimate_ms);
     let written = sqlx::query(
+        // The one `kind` there is: programs before this read it, and may run beside it.
         "INSERT INTO jobs (id, kind, calculator, version, engine, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20, $21, $22,
-             $23, octet_length($7::bytea), $24, $25, $26)
+         VALUES ($1, 'calculation', $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, $19, $20,
+             $21, $22, octet_length($6::bytea), $23, $24, $25)
          ON CONFLICT (owner, idempotency) DO NOTHING",
     )
     .bind(job.id.to_string())
-    .bind(job.kind.word())
     .bind(&job.calculator)
     .bind(column(job.version))
     .bind(engine)

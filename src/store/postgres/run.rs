@@ -17,7 +17,7 @@ const LOOKED_AT: i64 = 64;
 /// The columns of a [`Runnable`]; `$1` is the job whose input is wanted.
 macro_rules! taken {
     () => {
-        "id, key, state, attempt, kind, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
+        "id, key, state, attempt, calculator, priority, turn, owner, created_ms, traceparent, tracestate, \
          parent, shard, CASE WHEN id = $1 THEN input END AS input"
     };
 }

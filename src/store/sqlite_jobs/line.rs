@@ -89,14 +89,14 @@ pub(super) async fn submit(
     let priority = rank(job.priority);
     let turn = turn(connection, &job.owner, priority, job.estimate_ms).await?;
     sqlx::query(
+        // The one `kind` there is: to drop the column would write every job with its input anew.
         "INSERT INTO jobs (id, kind, calculator, version, key, input, state, progress, attempt, lease,
              heartbeat_ms, priority, turn, owner, idempotency, body_hash, estimate_ms, created_ms, started_ms,
              finished_ms, deadline_ms, expires_ms, input_bytes, result_bytes, traceparent, tracestate)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22,
-             length(?6), ?23, ?24, ?25)",
+         VALUES (?1, 'calculation', ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20,
+             ?21, length(?5), ?22, ?23, ?24)",
     )
     .bind(job.id.to_string())
-    .bind(job.kind.word())
     .bind(&job.calculator)
     .bind(job.version)
     .bind(job.key.as_bytes().as_slice())

@@ -10,7 +10,7 @@ use crate::store::sql::Outcome;
 macro_rules! runnable {
     ($condition:expr) => {
         concat!(
-            "SELECT id, key, state, kind, calculator, attempt, input, priority, turn, owner, created_ms, traceparent, tracestate, \
+            "SELECT id, key, state, calculator, attempt, input, priority, turn, owner, created_ms, traceparent, tracestate, \
                  parent, shard FROM jobs WHERE ",
             $condition
         )
