@@ -1,8 +1,7 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
 //!
 //! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], `jobs`). Both
-//! ways share the cache, the calculations under way and the calculation itself; `jobs` says how something else than
-//! one calculation becomes a job.
+//! ways share the cache, the calculations under way and the calculation itself.
 
 mod answer;
 mod asked;
@@ -75,7 +74,7 @@ use crate::store::processes::ProcessStore;
 use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
-use exec::{Cores, Slot, guarded};
+use exec::{Cores, Left, Slot, guarded};
 use generation::Generation;
 use jobs::Jobs;
 use memory::{Kept, Known as Recognised, Memory, fingerprint_on};
@@ -378,7 +377,7 @@ impl Inner {
             None => self.cores.slot().await?,
         };
         let (this, entry, shelf, runtime) = (Arc::clone(self), Arc::clone(entry), shelf.clone(), Handle::current());
-        let work = move || {
+        let work = move |_: &Left<'_>| {
             let mut draft = Draft::of(&entry, &body, (&this.registry, &room))?;
             // Names stand anywhere in the job. A thread of the pool may wait for the store.
             let found = runtime.block_on(this.find(&shelf, &draft.asks(&this.registry, &entry)))?;

@@ -15,12 +15,11 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use std::sync::Arc;
-use tokio::sync::oneshot;
 
 use super::running::Running;
 use super::work::{Work, answer};
 use super::{MOST_ATTEMPTS, fault, work};
-use crate::engine::exec::{Slot, guarded};
+use crate::engine::exec::{Left, Slot, guarded};
 use crate::engine::read::Ready;
 use crate::engine::{Engine, Error, Inner, Stored, compute, outcome};
 use crate::registry::Registry;
@@ -65,17 +64,12 @@ impl Work for Isolated {
             if let Some(kept) = engine.look_up(&ready.key).await {
                 return outcome(kept).map(|stored| answer(&stored));
             }
-            let (sender, receiver) = oneshot::channel();
-            let this = Arc::clone(&engine);
-            slot.line().push(move || {
+            let computed = move |left: &Left<'_>| {
                 let begun = Instant::now();
-                let given_up = || running.is_cancelled() || sender.is_closed();
-                let computed = guarded(|| compute_apart(&ready, &isolation, &given_up));
-                drop(slot);
-                // Nobody listens if the job was given up.
-                let _ = sender.send(this.keep(&ready, computed, begun.elapsed()));
-            });
-            receiver.await.unwrap_or(Err(Error::Crashed)).map(|stored| answer(&stored))
+                let computed = compute_apart(&ready, &isolation, &|| running.is_cancelled() || left());
+                engine.keep(&ready, computed, begun.elapsed())
+            };
+            slot.run(computed).await.map(|stored| answer(&stored))
         })
     }
 }

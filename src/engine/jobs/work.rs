@@ -6,13 +6,12 @@ use std::time::Instant;
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use serde_json::Value;
-use tokio::sync::oneshot;
 
 use super::MOST_ATTEMPTS;
 use super::isolated::Isolated;
 use super::running::Running;
 use super::shards::{self, OneShard};
-use crate::engine::exec::{Slot, guarded};
+use crate::engine::exec::Slot;
 use crate::engine::read::Ready;
 use crate::engine::single_flight::Joined;
 use crate::engine::{Error, Inner, Stored, read};
@@ -64,12 +63,8 @@ pub(super) fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
 
 /// The same as work, which it is where the job is large.
 pub(super) async fn prepared(entry: &Arc<Entry>, input: Bytes, slot: &Slot) -> Result<Ready, Error> {
-    let (entry, (sender, receiver)) = (Arc::clone(entry), oneshot::channel());
-    slot.line().push(move || {
-        // Nobody listens if the job was given up.
-        let _ = sender.send(guarded(|| ready(&entry, &input)));
-    });
-    receiver.await.unwrap_or(Err(Error::Crashed))
+    let entry = Arc::clone(entry);
+    slot.line().run(move |_| ready(&entry, &input)).await
 }
 
 /// An answer made of many: in shards, where that is worth it. A short job was let past the others, and its shards would wait
@@ -144,8 +139,7 @@ impl Inner {
             if let Some(leader) = leader
                 && let Some((ready, slot)) = mine.take()
             {
-                let (this, queued) = (Arc::clone(engine), Instant::now());
-                slot.line().push(move || this.run(leader, &ready, Some(slot), queued));
+                Self::enqueue(engine, leader, ready, slot, Instant::now());
             }
             let ended = tokio::select! {
                 ended = waiter.ended() => ended,
