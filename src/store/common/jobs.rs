@@ -12,7 +12,7 @@ use crate::key::Key;
 use crate::store::callbacks::Callback;
 use crate::store::jobs::{Claim, JobId, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing};
 use crate::store::row::ResultRow;
-use crate::store::sql::{Outcome, Session, sql};
+use crate::store::sql::{Outcome, Session, Statement, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
 
 /// Which columns a [`RecordRow`] is read from. A shard has no record that anybody reads.
@@ -116,7 +116,7 @@ pub(in crate::store) fn ids(texts: &[String]) -> Outcome<Vec<JobId>> {
 }
 
 /// The jobs whose ids are returned.
-async fn changed<S: Session>(connection: &mut S, statement: crate::store::sql::Statement) -> Outcome<Vec<JobId>> {
+async fn changed<S: Session>(connection: &mut S, statement: Statement) -> Outcome<Vec<JobId>> {
     let rows: Vec<(String,)> = connection.all(statement).await?;
     rows.iter().map(|(id,)| parsed(id)).collect()
 }
@@ -238,6 +238,18 @@ fn result_of(ending: &PackedEnding) -> Option<&ResultRow> {
     }
 }
 
+/// Ends what is computed under a lease.
+macro_rules! end_job {
+    () => {
+        "UPDATE jobs
+         SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
+             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = CASE WHEN parent IS NULL THEN $5 END,
+             key = coalesce($6, key), result_bytes = $7, content = $8
+         WHERE lease = $1 AND state = 'running' RETURNING id, parent, turn"
+    };
+}
+pub(in crate::store) use end_job;
+
 /// Ends what is computed under a lease, and keeps what it came to.
 pub(in crate::store) async fn finish<S: Session>(
     connection: &mut S,
@@ -250,7 +262,9 @@ pub(in crate::store) async fn finish<S: Session>(
         (PackedEnding::Succeeded(result), Some(_)) => {
             insert(connection, std::slice::from_ref(result), now).await?;
         }
-        (PackedEnding::Shard(_), Some((_, Some(parent), turn))) => shards::go_on(connection, parent, *turn).await?,
+        (PackedEnding::Shard(_), Some((_, Some(parent), turn))) => {
+            shards::go_on(connection, parent.clone(), *turn).await?;
+        }
         _ => {}
     }
     ended.iter().map(|(id, ..)| parsed(id)).collect()
@@ -261,22 +275,27 @@ async fn end<S: Session>(
     connection: &mut S,
     lease: Lease,
     ending: &PackedEnding,
-    (now, keep_ms): (i64, i64),
+    at: (i64, i64),
 ) -> Outcome<Vec<(String, Option<Vec<u8>>, i64)>> {
+    connection.all(ended(sql(end_job!()), lease, ending, at)).await
+}
+
+/// A statement that begins with [`end_job!`], with its values.
+pub(in crate::store) fn ended(
+    statement: Statement,
+    lease: Lease,
+    ending: &PackedEnding,
+    (now, keep_ms): (i64, i64),
+) -> Statement {
     let (state, content, problem) = match ending {
         PackedEnding::Succeeded(_) => (JobState::Succeeded, None, None),
         PackedEnding::Shard(content) => (JobState::Succeeded, Some(content.clone()), None),
         PackedEnding::Failed(problem) => (JobState::Failed, None, Some(problem.as_str())),
     };
     let result = result_of(ending);
-    let ended = sql("UPDATE jobs
-         SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = CASE WHEN parent IS NULL THEN $5 END,
-             key = coalesce($6, key), result_bytes = $7, content = $8
-         WHERE lease = $1 AND state = 'running' RETURNING id, parent, turn");
-    let ended = ended.bind(lease).bind(state.word()).bind(problem).bind(now).bind(now.saturating_add(keep_ms));
-    let ended = ended.bind(result.map(|result| result.key.clone())).bind(result.map_or(0, ResultRow::bytes));
-    connection.all(ended.bind(content)).await
+    let statement = statement.bind(lease).bind(state.word()).bind(problem).bind(now).bind(now.saturating_add(keep_ms));
+    let statement = statement.bind(result.map(|result| result.key.clone()));
+    statement.bind(result.map_or(0, ResultRow::bytes)).bind(content)
 }
 
 /// Puts the running jobs of a lease back in line that were last heard of at `heard_ms` or before: `charged` says whether the

@@ -4,7 +4,7 @@ use bytes::Bytes;
 use futures_util::future::BoxFuture;
 
 use super::line::submit;
-use super::run::{add_shards, beat, cancel, claim, finish, hold, redo, refuse, requeue, take, waits};
+use super::run::{add_shards, beat, cancel, claim, finish, finish_shard, hold, redo, refuse, requeue, take, waits};
 use super::writer::LIST_PATIENCE;
 use super::{PostgresStore, callbacks};
 use crate::key::Key;
@@ -17,7 +17,7 @@ use crate::store::jobs::{
     JobRecord, JobStore, Lease, Live, NewJob, Next, Shard, TakeUp, Timing, Tried, Usage, Wanted,
 };
 use crate::store::sql::Reads as _;
-use crate::store::sqlite_jobs::pack::{packed, packed_ending};
+use crate::store::sqlite_jobs::pack::{PackedEnding, packed, packed_ending};
 use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError};
 
 impl ResultStore for PostgresStore {
@@ -88,6 +88,10 @@ impl PostgresStore {
         }
         let ending = packed_ending(ending).await?;
         let (keep_ms, key) = (self.keep_ms, ending.key());
+        if matches!(ending, PackedEnding::Shard(_)) {
+            let mut connection = self.pool.acquire().await?;
+            return Ok(finish_shard(&mut connection, lease, &ending, (self.clock.now_ms(), keep_ms)).await?);
+        }
         let ended = self
             .write(move |connection| Box::pin(async move { finish(connection, lease, &ending, keep_ms).await }))
             .await?;

@@ -19,6 +19,7 @@ mod tests;
 mod tls;
 mod writer;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::future::BoxFuture;
@@ -82,7 +83,7 @@ pub(crate) struct PostgresStore {
     pool: PgPool,
     writer: Writer,
     newsroom: Newsroom,
-    clock: Clock,
+    clock: Arc<Clock>,
     /// What this process is called among those that run jobs.
     worker: Lease,
     keep_ms: i64,
@@ -96,11 +97,11 @@ impl PostgresStore {
     /// Connects, brings the tables up to date and looks after what this process takes on.
     pub(crate) async fn open(address: &Secret, usage: Use) -> Result<Self, OpenError> {
         let pool = start::connected(address, &usage).await?;
-        let clock = Clock::new();
+        let clock = Arc::new(Clock::new());
         clock.read(&pool).await.map_err(|error| start::refused(&error))?;
         let keep_ms = i64::try_from(usage.keep.jobs.as_millis()).unwrap_or(i64::MAX / 4);
         Ok(Self {
-            writer: Writer::start(pool.clone(), usage.keep),
+            writer: Writer::start(pool.clone(), Arc::clone(&clock), usage.keep),
             newsroom: Newsroom::open(pool.clone()),
             worker: Lease::new(),
             clock,

@@ -1,14 +1,16 @@
 //! How a job is taken, ended and put back. Whoever does it holds the lock of the job's key.
 
-use sqlx::postgres::{PgConnection, PgPool};
+use sqlx::postgres::{PgConnection, PgPool, PgRow};
+use sqlx::{FromRow, Row as _};
 
+use super::news::told;
 use super::{column, lock_job, lock_lease, news, texts};
 use crate::store::common::jobs::{
-    self, Runnable, fail_of_owner, parsed, put_back, record, set_back, set_cancelled, unwanted,
+    self, Runnable, end_job, fail_of_owner, parsed, put_back, record, set_back, set_cancelled, unwanted,
 };
-use crate::store::common::shards;
+use crate::store::common::shards::{self, BEHIND, MOST_OF_PARENT, get_on, give_turn};
 use crate::store::jobs::{Beat, Cancelled, Claimed, JobId, JobState, Lease, MOST_ATTEMPTS, Next, Wanted};
-use crate::store::sql::Outcome;
+use crate::store::sql::{Outcome, Session as _, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
 
 /// Of what waits so many are looked at for one that nobody else is about to take.
@@ -62,7 +64,13 @@ pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wa
             return Ok(Next::Run(claim));
         }
     }
-    let Some((id, key, now)) = first(connection, &taker, wanted.short_ms).await? else { return Ok(Next::Nothing) };
+    let First { id, key, now, .. } = match first(connection, &taker, wanted).await? {
+        None => return Ok(Next::Nothing),
+        Some(First { id, begun: Some(shard), .. }) => {
+            return Ok(Next::Run(shard.claim(wanted.lease, vec![parsed(&id)?])?));
+        }
+        Some(first) => first,
+    };
     let start = Start { lease: wanted.lease, most: MOST_ATTEMPTS - 1, problem: None };
     let taken = start.taken(connection, (&id, &key, now), keep_ms).await?;
     if let Claimed::Run(claim) = claimed(connection, &id, wanted.lease, taken).await? {
@@ -85,24 +93,46 @@ pub(super) async fn take(connection: &mut PgConnection, taker: Taker, wanted: Wa
     })
 }
 
-/// The first in line whose key nobody else has, with the lock of its key and the time. Who is about to take another is
-/// passed over, not waited for.
-async fn first(
-    connection: &mut PgConnection,
-    taker: &Taker,
-    short_ms: Option<f64>,
-) -> Outcome<Option<(String, Vec<u8>, i64)>> {
+/// What is first in line, at which time.
+struct First {
+    id: String,
+    key: Vec<u8>,
+    now: i64,
+    /// A shard runs already.
+    begun: Option<Runnable>,
+}
+
+impl FromRow<'_, PgRow> for First {
+    fn from_row(row: &PgRow) -> Outcome<Self> {
+        let is_begun = row.try_get::<Option<String>, _>("state")?.is_some();
+        let begun = if is_begun { Some(Runnable::from_row(row)?) } else { None };
+        Ok(Self { id: row.try_get("id")?, key: row.try_get("key")?, now: row.try_get("now")?, begun })
+    }
+}
+
+/// The first in line whose key nobody else has, with the lock of its key. Who is about to take another is passed over, not
+/// waited for. A shard is taken at once: there are many of them, and none has an equal one.
+async fn first(connection: &mut PgConnection, taker: &Taker, wanted: Wanted) -> Outcome<Option<First>> {
     // The rows are materialised in order, and looked at one after the other until a lock is there: no other is taken.
     sqlx::query_as(concat!(
         "WITH line AS MATERIALIZED (SELECT id, key FROM jobs WHERE ",
         in_line!(),
-        " ORDER BY priority DESC, turn, id LIMIT $4)
-         SELECT id, key, now_ms() FROM line WHERE pg_try_advisory_xact_lock(lock_of(key)) LIMIT 1"
+        " ORDER BY priority DESC, turn, id LIMIT $4),
+         first AS MATERIALIZED (
+             SELECT id, key, now_ms() AS now FROM line WHERE pg_try_advisory_xact_lock(lock_of(key)) LIMIT 1),
+         begun AS (
+             UPDATE jobs SET state = 'running', attempt = attempt + 1, lease = $5, heartbeat_ms = first.now,
+                 started_ms = first.now, progress = 0, stage = NULL
+             FROM first WHERE jobs.id = first.id AND shard IS NOT NULL AND state = 'queued' AND attempt < $6
+             RETURNING state, attempt, calculator, priority, turn, owner, created_ms, traceparent, tracestate, parent, shard)
+         SELECT first.*, begun.*, NULL::bytea AS input FROM first LEFT JOIN begun ON true"
     ))
     .bind(&taker.engine)
     .bind(taker.silence_ms)
-    .bind(short_ms)
+    .bind(wanted.short_ms)
     .bind(LOOKED_AT)
+    .bind(wanted.lease.to_string())
+    .bind(column(MOST_ATTEMPTS - 1))
     .fetch_optional(connection)
     .await
 }
@@ -217,6 +247,30 @@ pub(super) async fn hold(pool: &PgPool, id: JobId) -> Outcome<()> {
     .execute(pool)
     .await
     .map(drop)
+}
+
+/// Ends a shard, with all that [`shards::go_on`] does, in one statement. No job can join it meanwhile, so that its key is not
+/// locked: that the lease holds is seen when the row is written.
+pub(super) async fn finish_shard(
+    connection: &mut PgConnection,
+    lease: Lease,
+    ending: &PackedEnding,
+    at: (i64, i64),
+) -> Outcome<Vec<JobId>> {
+    let statement = sql(concat!(
+        "WITH ended AS (",
+        end_job!(),
+        "), gets_on AS (",
+        get_on!("(SELECT parent FROM ended)", "$9"),
+        "), given AS (",
+        give_turn!("(SELECT parent FROM ended WHERE turn < $10)", "$10"),
+        ") SELECT id, ",
+        told!("id"),
+        " FROM ended"
+    ));
+    let statement = jobs::ended(statement, lease, ending, at).bind(MOST_OF_PARENT).bind(BEHIND);
+    let ended: Vec<(String,)> = connection.all(statement).await?;
+    ended.iter().map(|(id,)| parsed(id)).collect()
 }
 
 pub(super) async fn finish(

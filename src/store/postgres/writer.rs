@@ -10,6 +10,7 @@ use sqlx::postgres::PgPool;
 use tokio::sync::{Mutex, mpsc, oneshot};
 use tokio::task::JoinHandle;
 
+use super::clock::Clock;
 use super::results;
 use crate::key::Key;
 use crate::store::KeptResult;
@@ -86,10 +87,10 @@ fn size(result: &KeptResult) -> usize {
 }
 
 impl Writer {
-    pub(super) fn start(pool: PgPool, keep: Keep) -> Self {
+    pub(super) fn start(pool: PgPool, clock: Arc<Clock>, keep: Keep) -> Self {
         let (orders, receiver) = mpsc::channel(WAITING_ORDERS);
         let desk: Arc<Desk> = Arc::default();
-        let clerk = Clerk { pool, keep, desk: Arc::clone(&desk), unlooked_bytes: 0 };
+        let clerk = Clerk { pool, clock, keep, desk: Arc::clone(&desk), unlooked_bytes: 0 };
         Self { orders, desk, task: Mutex::new(Some(tokio::spawn(clerk.work(receiver)))) }
     }
 
@@ -152,6 +153,7 @@ impl Writer {
 
 struct Clerk {
     pool: PgPool,
+    clock: Arc<Clock>,
     keep: Keep,
     desk: Arc<Desk>,
     /// Bytes written since the last look at the total.
@@ -219,7 +221,7 @@ impl Clerk {
     /// Writes a group, again and again while the database is away; whether it is written.
     async fn write(&mut self, rows: &[ResultRow], group: &Group) -> bool {
         for attempt in 1..=ATTEMPTS {
-            match write(&self.pool, rows, group).await {
+            match write(&self.pool, rows, group, self.clock.now_ms()).await {
                 Ok(()) => {
                     let bytes: i64 = rows.iter().map(ResultRow::bytes).sum();
                     self.unlooked_bytes += u64::try_from(bytes).unwrap_or(0);
@@ -250,9 +252,12 @@ impl Clerk {
     }
 }
 
-async fn write(pool: &PgPool, rows: &[ResultRow], group: &Group) -> Outcome<()> {
+async fn write(pool: &PgPool, rows: &[ResultRow], group: &Group, now: i64) -> Outcome<()> {
+    if group.forgotten.is_empty() && group.touched.is_empty() && rows.len() <= ROWS_AT_ONCE {
+        // One statement is a transaction of its own.
+        return common::results::insert(&mut *pool.acquire().await?, rows, now).await.map(drop);
+    }
     let mut transaction = pool.begin().await?;
-    let now: i64 = sqlx::query_scalar("SELECT now_ms()").fetch_one(&mut *transaction).await?;
     let bytes = |keys: &mut dyn Iterator<Item = &Key>| -> Vec<Vec<u8>> {
         let mut keys: Vec<Vec<u8>> = keys.map(|key| key.as_bytes().to_vec()).collect();
         keys.sort_unstable();
