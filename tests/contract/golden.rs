@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use precut::engine::{Body, solve_now};
+use precut::engine::{Body, Given, solve_now};
 use precut::registry::Registry;
 use precut_calc::calculator::Unwatched;
 use serde_json::{Value, json};
@@ -53,7 +53,8 @@ fn numbers_change_only_with_the_version_and_the_start_page_shows_them() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{}.json", meta.id));
         let (mut found, mut equations) = (BTreeMap::new(), BTreeSet::new());
         for example in meta.examples {
-            let stored = solve_now(&registry, meta.id, Body::Json(example.job.into()), &Unwatched).unwrap();
+            let stored =
+                solve_now(&registry, meta.id, Body::Json(example.job.into()), &Given::default(), &Unwatched).unwrap();
             let answer: Value = serde_json::from_slice(&stored.body).unwrap();
             digest(&answer["result"], example.id, &mut found);
             let basis = answer["basis"].as_array().unwrap();
