@@ -322,10 +322,8 @@ pub enum News {
 /// Who hears of news.
 pub type Hear = Arc<dyn Fn(News) + Send + Sync>;
 
-/// Where jobs are kept and queued. What it has said yes to survives the process.
-pub trait JobStore: Send + Sync + 'static {
-    /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
-    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>>;
+/// What becomes of jobs once they are there: the same in every store.
+pub trait JobShelf: Send + Sync + 'static {
     /// A job's record.
     fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>>;
     /// The jobs, newest first.
@@ -333,36 +331,30 @@ pub trait JobStore: Send + Sync + 'static {
     /// What jobs need to run, compressed, as far as it takes no more than so many bytes; those that have none any more
     /// are left out.
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
-    /// How many wait and run, since when, and how large the database is.
-    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// Whether there is something to do, for [`Wanted::short_ms`].
-    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
-    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start. A shard is taken
-    /// only while its parent runs.
-    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
-    /// Keeps a suspect from others for `SILENCE`.
-    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
-    /// `problem`, if they have been charged `most` already.
-    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
-    /// Ends a computation and all jobs that still want it; which these are. A shard ends only once the results of its points
-    /// are written, and is forgotten with the end of its parent.
-    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
-    /// Puts shards of what runs under a lease in line, also such as are over; those that wait or run stay as they are. One
-    /// of them has the parent's turn, the others go behind all jobs of its priority. Whether the lease holds.
-    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Of these shards those that are over.
     fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>>;
     /// What is needed to run the job of a key that runs.
     fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>>;
-    /// Puts a computation back in line without a charge.
-    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// What an owner takes of the service.
     fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>>;
     /// What is kept of jobs and their results for each owner of keys, bytes.
     fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>>;
     /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Writes what came of a try; whether it was still who tried that holds it.
+    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// The latest timings, newest first, at most `limit`.
+    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
+    /// Keeps a suspect from others for `SILENCE`.
+    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
+    /// `problem`, if they have been charged `most` already.
+    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
+    /// Puts shards of what runs under a lease in line, also such as are over; those that wait or run stay as they are. One
+    /// of them has the parent's turn, the others go behind all jobs of its priority. Whether the lease holds.
+    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Puts a computation back in line without a charge.
+    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Fails an owner's jobs of a computation that has not begun, with `problem`, and puts the others back in line, without
     /// a charge; which have failed.
     fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
@@ -370,6 +362,22 @@ pub trait JobStore: Send + Sync + 'static {
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
     /// Puts a job whose result is damaged back in line.
     fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+}
+
+/// Where jobs are kept and queued. What it has said yes to survives the process.
+pub trait JobStore: JobShelf {
+    /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
+    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>>;
+    /// How many wait and run, since when, and how large the database is.
+    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
+    /// Whether there is something to do, for [`Wanted::short_ms`].
+    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start. A shard is taken
+    /// only while its parent runs.
+    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
+    /// Ends a computation and all jobs that still want it; which these are. A shard ends only once the results of its points
+    /// are written, and is forgotten with the end of its parent.
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Notes how far computations are; which of them nobody wants any more.
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>>;
     /// Fails, with `problem`, what is past its deadline; and when the next deadline is, ms UTC.
@@ -379,14 +387,10 @@ pub trait JobStore: Send + Sync + 'static {
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Takes up callbacks that are due.
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>>;
-    /// Writes what came of a try; whether it was still who tried that holds it.
-    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Forgets jobs whose time is over.
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// Notes what a job took.
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// The latest timings, newest first, at most `limit`.
-    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
 
     /// Whether other processes work with the same jobs.
     fn is_shared(&self) -> bool {

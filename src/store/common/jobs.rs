@@ -10,7 +10,7 @@ use super::results::insert;
 use super::shards;
 use crate::key::Key;
 use crate::store::callbacks::Callback;
-use crate::store::jobs::{Claim, JobId, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing};
+use crate::store::jobs::{JobId, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, Timing};
 use crate::store::row::ResultRow;
 use crate::store::sql::{Outcome, Session, Statement, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
@@ -130,7 +130,7 @@ pub(in crate::store) async fn record<S: Session>(connection: &mut S, id: JobId) 
     row.map(read).transpose()
 }
 
-pub(in crate::store) async fn list<S: Session>(connection: &mut S, query: JobQuery) -> Outcome<JobPage> {
+pub(super) async fn list<S: Session>(connection: &mut S, query: JobQuery) -> Outcome<JobPage> {
     let mut statement = sql(records!(""));
     if let Some(state) = query.state {
         statement.push(" AND jobs.state = ").push_bind(state.word());
@@ -158,11 +158,7 @@ pub(in crate::store) async fn list<S: Session>(connection: &mut S, query: JobQue
 }
 
 /// The inputs of some jobs, as far as they are kept and take no more than `most` bytes.
-pub(in crate::store) async fn inputs<S: Session>(
-    connection: &mut S,
-    ids: &[JobId],
-    most: usize,
-) -> Outcome<Vec<(JobId, Bytes)>> {
+pub(super) async fn inputs<S: Session>(connection: &mut S, ids: &[JobId], most: usize) -> Outcome<Vec<(JobId, Bytes)>> {
     if ids.is_empty() {
         return Ok(Vec::new());
     }
@@ -170,64 +166,6 @@ pub(in crate::store) async fn inputs<S: Session>(
     statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND id IN ").push_list(ids.iter().copied());
     let rows: Vec<(String, Vec<u8>)> = connection.all(statement).await?;
     Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
-}
-
-/// The input of a job as it is kept. A damaged one is nothing that can be run: who claims it finds that out and says so on
-/// the record.
-pub(in crate::store) fn unpacked(input: &[u8]) -> Bytes {
-    zstd::decode_all(input).unwrap_or_default().into()
-}
-
-/// A job with what it takes to run it.
-pub(in crate::store) struct Runnable {
-    pub(in crate::store) id: String,
-    pub(in crate::store) key: Vec<u8>,
-    pub(in crate::store) state: String,
-    pub(in crate::store) calculator: String,
-    pub(in crate::store) attempt: u32,
-    /// None where another one has the same.
-    input: Option<Vec<u8>>,
-    pub(in crate::store) priority: i32,
-    pub(in crate::store) turn: i64,
-    owner: String,
-    created_ms: i64,
-    traceparent: Option<String>,
-    tracestate: Option<String>,
-    parent: Option<Vec<u8>>,
-    shard: Option<i32>,
-}
-
-from_row!(Runnable {
-    id, key, state, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate,
-    parent, shard
-});
-
-impl Runnable {
-    pub(in crate::store) const fn is_shard(&self) -> bool {
-        self.shard.is_some()
-    }
-
-    fn shard(&self) -> Outcome<Option<ShardId>> {
-        let Some((parent, number)) = self.parent.as_ref().zip(self.shard) else { return Ok(None) };
-        let parent = Key::from_bytes(parent).ok_or_else(|| unreadable("parent"))?;
-        Ok(Some(ShardId { parent, number: count(number) }))
-    }
-
-    pub(in crate::store) fn claim(self, lease: Lease, jobs: Vec<JobId>) -> Outcome<Box<Claim>> {
-        Ok(Box::new(Claim {
-            lease,
-            jobs,
-            key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
-            shard: self.shard()?,
-            calculator: self.calculator,
-            input: unpacked(&self.input.unwrap_or_default()),
-            attempt: self.attempt,
-            owner: self.owner,
-            created_ms: self.created_ms,
-            traceparent: self.traceparent,
-            tracestate: self.tracestate,
-        }))
-    }
 }
 
 /// The result of an ending.
@@ -251,7 +189,7 @@ macro_rules! end_job {
 pub(in crate::store) use end_job;
 
 /// Ends what is computed under a lease, and keeps what it came to.
-pub(in crate::store) async fn finish<S: Session>(
+pub(super) async fn end_leased<S: Session>(
     connection: &mut S,
     lease: Lease,
     ending: &PackedEnding,
@@ -303,7 +241,7 @@ pub(in crate::store) fn ended(
 /// along any more. A shard keeps its turn, its parent's or the one behind all others.
 pub(in crate::store) async fn put_back<S: Session>(
     connection: &mut S,
-    lease: &str,
+    lease: Lease,
     charged: bool,
     heard_ms: i64,
 ) -> Outcome<Vec<JobId>> {
@@ -376,7 +314,7 @@ pub(in crate::store) async fn note_timing<S: Session>(connection: &mut S, timing
     connection.run(noted.bind(now)).await.map(drop)
 }
 
-pub(in crate::store) async fn timings<S: Session>(connection: &mut S, limit: u32) -> Outcome<Vec<Timing>> {
+pub(super) async fn timings<S: Session>(connection: &mut S, limit: u32) -> Outcome<Vec<Timing>> {
     let timings = sql("SELECT calculator, version, predicted_ms, actual_ms FROM timings ORDER BY at_ms DESC LIMIT $1")
         .bind(limit);
     let rows: Vec<(String, i32, f64, f64)> = connection.all(timings).await?;

@@ -5,7 +5,8 @@
 
 use bytes::Bytes;
 
-use super::jobs::{count, unpacked};
+use super::jobs::count;
+use super::runnable::unpacked;
 use crate::key::Key;
 use crate::store::jobs::{Lease, MOST_ATTEMPTS, Shard, ShardId};
 use crate::store::sql::{Outcome, Session, Value, sql};
@@ -13,19 +14,13 @@ use crate::store::sql::{Outcome, Session, Value, sql};
 /// The turn of shards that go behind all other jobs of their priority.
 pub(in crate::store) const BEHIND: i64 = i64::MAX / 4;
 
-/// Puts shards of what runs under a lease in line; `engine` is a column that only one of the stores has. Whether the lease
-/// holds.
-pub(in crate::store) async fn add<S: Session>(
-    connection: &mut S,
-    lease: Lease,
-    numbers: &[u32],
-    engine: &'static str,
-) -> Outcome<bool> {
+/// Puts shards of what runs under a lease in line. Whether the lease holds.
+pub(super) async fn add<S: Session>(connection: &mut S, lease: Lease, numbers: &[u32]) -> Outcome<bool> {
     let parent = sql("SELECT key FROM jobs WHERE lease = $1 AND state = 'running' LIMIT 1").bind(lease);
     let parent = connection.first::<(Vec<u8>,)>(parent).await?;
     let Some(parent) = parent.and_then(|(key,)| Key::from_bytes(&key)) else { return Ok(false) };
     if !numbers.is_empty() {
-        insert(connection, (lease, parent), numbers, engine).await?;
+        insert(connection, (lease, parent), numbers).await?;
     }
     // Unless one of them has it.
     let given = sql(concat!(
@@ -37,19 +32,14 @@ pub(in crate::store) async fn add<S: Session>(
     Ok(true)
 }
 
-async fn insert<S: Session>(
-    connection: &mut S,
-    (lease, parent): (Lease, Key),
-    numbers: &[u32],
-    engine: &'static str,
-) -> Outcome<()> {
+async fn insert<S: Session>(connection: &mut S, (lease, parent): (Lease, Key), numbers: &[u32]) -> Outcome<()> {
     let now = connection.now_ms().await?;
     let mut added =
         sql("INSERT INTO jobs (id, key, shard, kind, calculator, version, priority, parent, input, state, turn,
              owner, estimate_ms, created_ms");
-    added.push(engine).push(") SELECT column1, column2, column3, kind, calculator, version, priority, key, ");
+    added.push(S::ENGINE).push(") SELECT column1, column2, column3, kind, calculator, version, priority, key, ");
     added.push_bind(Vec::<u8>::new()).push(", 'queued', ").push_bind(BEHIND).push(", '', 0.0, ").push_bind(now);
-    added.push(engine).push(" FROM (SELECT * FROM jobs WHERE lease = ").push_bind(lease);
+    added.push(S::ENGINE).push(" FROM (SELECT * FROM jobs WHERE lease = ").push_bind(lease);
     added.push(" AND state = 'running' ORDER BY id LIMIT 1) AS whole, (VALUES ");
     for (index, &number) in numbers.iter().enumerate() {
         let shard = ShardId { parent, number };

@@ -42,7 +42,7 @@ macro_rules! told {
 pub(super) use told;
 
 /// Tells all processes, once the transaction is committed.
-pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
+pub(in crate::store) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
     let (jobs, unwanted) = (texts(jobs), texts(unwanted));
     let of_jobs = jobs.chunks(TOLD_AT_ONCE).map(|jobs| Notice { jobs: jobs.to_vec(), ..Notice::default() });
     let of_leases =
