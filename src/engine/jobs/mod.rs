@@ -31,8 +31,8 @@
 //! finished. A shard that may have ended its processes runs alone, with each of its points in a process of its own; if one of
 //! these ends that, the study fails with the shard.
 //!
-//! Everything here but [`work`] knows a job only as a [`NewJob`]: calculator, key, input as bytes. [`work::of`] makes
-//! a [`work::Work`] of that again.
+//! Everything here but [`work`] knows a job only as a [`NewJob`]: calculator, key, input as bytes. [`work::Work::of`]
+//! makes work of that again.
 
 mod estimate;
 mod fault;
@@ -126,7 +126,7 @@ pub(crate) struct Request {
     pub(crate) version: u32,
     /// Address of its result.
     pub(crate) key: Key,
-    /// All that [`work::of`] needs.
+    /// All that [`work::Work::of`] needs.
     pub(crate) input: Bytes,
     /// Estimated work, ms.
     pub(crate) estimate_ms: f64,

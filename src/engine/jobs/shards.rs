@@ -9,13 +9,12 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use futures_util::future::BoxFuture;
 use precut_calc::calculator::{Message, Monitor};
 use tokio::sync::OnceCell;
 use tokio::task::spawn_blocking;
 
 use super::running::Running;
-use super::work::{Work, prepared};
+use super::work::prepared;
 use super::worker::stubbornly;
 use super::{MOST_ATTEMPTS, fault};
 use crate::engine::exec::{Left, Slot, guarded};
@@ -206,25 +205,18 @@ pub(super) struct OneShard {
     pub(super) apart: bool,
 }
 
-impl Work for OneShard {
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
-        slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>> {
-        Box::pin(async move {
-            let Self { shard, entry, apart } = *self;
-            metrics::counter!("precut_jobs_shards_total").increment(1);
-            let plan = engine.jobs.plans.of(&shard.parent);
-            let sharded = plan.get_or_try_init(|| planned(&engine, &entry, shard.parent, &slot)).await?;
-            let sharded = Arc::clone(sharded);
-            let computed = move |left: &Left<'_>| {
-                let wanted = Wanted { running: &running, left };
-                sharded.compute(shard.number as usize, &wanted, apart).map_err(unfinished)
-            };
-            slot.run(computed).await.map(|content| Ending::Shard(content.into()))
-        })
+impl OneShard {
+    pub(super) async fn run(self, engine: &Arc<Inner>, running: &Arc<Running>, slot: Slot) -> Result<Ending, Error> {
+        let Self { shard, entry, apart } = self;
+        metrics::counter!("precut_jobs_shards_total").increment(1);
+        let plan = engine.jobs.plans.of(&shard.parent);
+        let sharded = plan.get_or_try_init(|| planned(engine, &entry, shard.parent, &slot)).await?;
+        let (sharded, running) = (Arc::clone(sharded), Arc::clone(running));
+        let computed = move |left: &Left<'_>| {
+            let wanted = Wanted { running: &running, left };
+            sharded.compute(shard.number as usize, &wanted, apart).map_err(unfinished)
+        };
+        slot.run(computed).await.map(|content| Ending::Shard(content.into()))
     }
 }
 
