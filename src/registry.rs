@@ -3,13 +3,13 @@
 //! One line in `precut_calc::register` makes a calculator known; everything that the service needs of it
 //! follows from its [`Calculator`] declaration through [`Entry`].
 
+mod calculation;
 mod canonical;
 mod checker;
 mod contract;
 mod entry;
 mod family;
 mod fault;
-mod finite;
 mod names;
 mod nearest;
 mod place;
@@ -20,25 +20,28 @@ mod shape;
 mod tests;
 #[cfg(test)]
 pub(crate) mod toy;
+mod typed;
 mod watched;
 mod way;
 
 use entry::Member;
 
-pub use entry::{Entry, Prepared, ResultNotes, Schemas, UnreadableResult};
+pub use calculation::{Prepared, ResultNotes, UnreadableResult};
+pub use entry::{Entry, Schemas};
 
+pub(crate) use calculation::{Calculation, Job, Sharded, Unfinished, Unprepared};
 pub(crate) use canonical::canonical;
 pub(crate) use checker::{Checker, Faults, by_pointer, child};
-pub(crate) use entry::{Calculation, Job, ModelUse, Sharded, Unfinished, Unprepared, second_line};
+pub(crate) use entry::ModelUse;
 pub(crate) use fault::{cut_short_at, intern as interned};
-pub(crate) use finite::non_finite_place;
 pub(crate) use names::takes as takes_names;
 pub(crate) use nearest::nearest;
 #[cfg(test)]
 pub(crate) use place::FreeColumns;
 pub(crate) use place::{CellKind, Step, TableColumn, TablePlace, TextPlace};
-pub(crate) use result_text::{Unwritable, append as append_result};
+pub(crate) use result_text::{Unwritable, append as append_result, non_finite_place};
 pub(crate) use shape::Shape;
+pub(crate) use typed::second_line;
 pub(crate) use watched::{NotReplayed, Observed, Replayed, Watching};
 pub(crate) use way::{forms, way};
 

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::{Failed, exit_code, job, print};
-use crate::engine::{Body, Error, FilePart, Given, solve_with};
+use crate::engine::{Body, Error, FilePart, Given, solve_now};
 use crate::http::{Media, Problem, written};
 use crate::registry::Registry;
 use crate::text::Language;
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &CompensateArgs, registry: &Registry, language: Lan
     let body = Body::Parts { job: job_without_program(&arguments.job)?, files: vec![program] };
     let library = arguments.library.as_ref().map(|file| job::library_file(file)).transpose()?;
     let given = Given { library, ..Given::default() };
-    let stored = match solve_with(registry, CALCULATOR, body, &given, &Unwatched) {
+    let stored = match solve_now(registry, CALCULATOR, body, &given, &Unwatched) {
         Ok(stored) => stored,
         Err(error) => return Ok(refused(error, &arguments.program, language)),
     };

@@ -12,8 +12,8 @@ use serde_json::value::RawValue;
 
 use super::{Failed, JobArgs, SolveArgs, entry, print, print_json};
 use crate::engine::{
-    Body, Error, FilePart, Form as FileForm, Given, Library, ModelFile, NotGiven, STUDIES, SyntaxFault, check_with,
-    solve_with,
+    Body, Error, FilePart, Form as FileForm, Given, Library, ModelFile, NotGiven, STUDIES, SyntaxFault, check_now,
+    solve_now,
 };
 use crate::http::{Media, Problem, written};
 use crate::registry::{Entry, Registry};
@@ -60,7 +60,7 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
         Form::Svg => arguments.figure.as_deref(),
         Form::Json | Form::Gcode | Form::Diff | Form::Xlsx | Form::Pdf => None,
     };
-    let stored = solve_with(registry, &calculator, body, &given, &Unwatched)?;
+    let stored = solve_now(registry, &calculator, body, &given, &Unwatched)?;
     let bytes = written(&stored, arguments.format.into(), part, language)?;
     match &arguments.output {
         Some(path) => std::fs::write(path, &bytes).map_err(|error| Failed::Machine(named(path, &error))),
@@ -77,7 +77,7 @@ pub(super) fn solve(arguments: &SolveArgs, registry: &Registry, language: Langua
 /// `precut check`
 pub(super) fn check(arguments: &JobArgs, registry: &Registry) -> Result<(), Failed> {
     let (calculator, body, given) = read(arguments, registry)?;
-    let checked = check_with(registry, &calculator, body, &given)?;
+    let checked = check_now(registry, &calculator, body, &given)?;
     print_json(&json!({
         "calculator": calculator,
         "key": checked.key.to_string(),

@@ -58,19 +58,17 @@ impl Slot {
         self.is_short
     }
 
-    /// Runs `work` and waits for it.
+    /// Runs `work`, see [`Line::run`], and is given back with its end.
     pub(crate) async fn run<T: Send + 'static>(
         self,
-        work: impl FnOnce() -> Result<T, Error> + Send + 'static,
+        work: impl FnOnce(&Left<'_>) -> Result<T, Error> + Send + 'static,
     ) -> Result<T, Error> {
-        let (sender, receiver) = oneshot::channel();
-        self.line().push(move || {
-            let outcome = guarded(work);
-            drop(self);
-            // Nobody listens if the client has gone.
-            let _ = sender.send(outcome);
-        });
-        receiver.await.unwrap_or(Err(Error::Crashed))
+        self.line()
+            .run(move |left| {
+                let _held = self;
+                work(left)
+            })
+            .await
     }
 }
 
@@ -201,7 +199,23 @@ struct Standing {
     closed: bool,
 }
 
+/// Whether nobody waits any more for what is computed.
+pub(crate) type Left<'l> = dyn Fn() -> bool + Sync + 'l;
+
 impl Line {
+    /// Runs `work` and waits for it. A future that is dropped waits no more; the work is not interrupted, but may ask.
+    pub(crate) async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&Left<'_>) -> Result<T, Error> + Send + 'static,
+    ) -> Result<T, Error> {
+        let (sender, receiver) = oneshot::channel();
+        self.push(move || {
+            let outcome = guarded(|| work(&|| sender.is_closed()));
+            let _ = sender.send(outcome);
+        });
+        receiver.await.unwrap_or(Err(Error::Crashed))
+    }
+
     pub(crate) fn push(&self, work: impl FnOnce() + Send + 'static) {
         let mut standing = self.lock();
         standing.work.push_back(Box::new(work));

@@ -1,13 +1,15 @@
 //! From the bytes of a job to the bytes of its answer. Knows calculators by name, nothing of HTTP.
 //!
 //! A job is answered at once ([`Engine::solve`]) or put on record and run behind ([`Engine::submit`], `jobs`). Both
-//! ways share the cache, the calculations under way and the calculation itself; `jobs` says how something else than
-//! one calculation becomes a job.
+//! ways share the cache, the calculations under way and the calculation itself.
 
+mod alone;
 mod answer;
 mod asked;
 pub(crate) mod budget;
+mod cache;
 mod compare;
+mod cost;
 mod csv_table;
 mod envelope;
 mod error;
@@ -38,7 +40,8 @@ mod watch;
 pub use crate::key::{BadKey, ENGINE_VERSION, Key};
 pub use crate::store::OpenError;
 pub use crate::store::callbacks::{Callback, CallbackState, DueCallback, NewCallback, Subject, TakeUp, Tried};
-pub use crate::store::jobs::{JobId, JobKind, JobQuery, JobRecord, JobState, Priority};
+pub use crate::store::jobs::{JobId, JobQuery, JobRecord, JobState, Priority};
+pub use alone::{check_now, solve_now, studies_of};
 pub use answer::{Body, CacheState, Checked, FilePart, Solved, Stored, Timings};
 pub use compare::{ModelComparison, Sides};
 pub use error::{Error, SyntaxFault};
@@ -65,17 +68,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 pub(crate) use precut_calc::calculator::Quiet;
-use precut_calc::calculator::{Cost, Failure, Monitor};
+use precut_calc::calculator::{Failure, Monitor};
 use tokio::runtime::Handle;
 
 use crate::registry::{Entry, Registry};
 use crate::store::documents::DocumentStore;
 use crate::store::jobs::JobStore;
 use crate::store::processes::ProcessStore;
-use crate::store::{Origin, ResultPage, ResultQuery, ResultStore, Store};
+use crate::store::{ResultStore, Store};
 use asked::Asked;
 use budget::{Budget, Room, paid_beside};
-use exec::{Cores, Slot, guarded};
+use cache::{hit, outcome};
+use exec::{Cores, Left, Slot, guarded};
 use generation::Generation;
 use jobs::Jobs;
 use memory::{Kept, Known as Recognised, Memory, fingerprint_on};
@@ -275,44 +279,6 @@ impl Engine {
         }
     }
 
-    /// A kept answer.
-    pub async fn result(&self, key: &Key) -> Result<Option<Arc<Stored>>, Error> {
-        match self.inner.memory.get(key) {
-            Some(Kept::Answer(stored)) => Ok(Some(stored)),
-            Some(Kept::Failure(_)) => Ok(None),
-            None => Ok(self.inner.fetch(key).await?),
-        }
-    }
-
-    /// Notes that an owner has asked for an answer: it is one of his from now on.
-    pub async fn note_asked(&self, key: &Key, owner: &str, cache: CacheState) -> Result<(), Error> {
-        if self.inner.asked.is_new(key, owner) || cache == CacheState::Miss {
-            self.inner.store.note_asked(*key, owner.to_owned()).await?;
-            self.inner.asked.add(key, owner);
-        }
-        Ok(())
-    }
-
-    /// Whether an owner has asked for an answer.
-    pub async fn has_asked(&self, key: &Key, owner: &str) -> Result<bool, Error> {
-        Ok(self.inner.store.has_asked(*key, owner.to_owned()).await?)
-    }
-
-    /// Since when an answer is kept, and who has asked for it: of all, or of one owner.
-    pub async fn origin(&self, key: &Key, owner: Option<String>) -> Result<Origin, Error> {
-        Ok(self.inner.store.origin(*key, owner).await?)
-    }
-
-    /// The list of kept answers, newest first.
-    pub async fn results(&self, query: ResultQuery) -> Result<ResultPage, Error> {
-        Ok(self.inner.store.list(query).await?)
-    }
-
-    /// How many kept answers got a record of that address (`machines/lathe-3@4`): of all, or of one owner.
-    pub async fn uses(&self, record: String, owner: Option<String>) -> Result<u64, Error> {
-        Ok(self.inner.store.uses(record, owner).await?)
-    }
-
     /// Whether it serves: the store answers and nobody has closed it.
     pub async fn ready(&self) -> Result<(), Error> {
         if self.inner.closed.load(Ordering::Relaxed) {
@@ -378,7 +344,7 @@ impl Inner {
             None => self.cores.slot().await?,
         };
         let (this, entry, shelf, runtime) = (Arc::clone(self), Arc::clone(entry), shelf.clone(), Handle::current());
-        let work = move || {
+        let work = move |_: &Left<'_>| {
             let mut draft = Draft::of(&entry, &body, (&this.registry, &room))?;
             // Names stand anywhere in the job. A thread of the pool may wait for the store.
             let found = runtime.block_on(this.find(&shelf, &draft.asks(&this.registry, &entry)))?;
@@ -390,51 +356,6 @@ impl Inner {
     /// What is known of the names of a job.
     async fn find(&self, shelf: &Shelf, asks: &Asks) -> Result<names::Found, Error> {
         if asks.is_empty() { Ok(names::Found::default()) } else { self.finder(shelf).await?.all(asks).await }
-    }
-
-    /// What is kept under a key, in memory or in the store. A store that fails is as good as an empty one here.
-    async fn look_up(&self, key: &Key) -> Option<Kept> {
-        if let Some(kept) = self.memory.get(key) {
-            metrics::counter!("precut_cache_hits_total", "tier" => "memory").increment(1);
-            return Some(kept);
-        }
-        match self.fetch(key).await {
-            Ok(stored) => stored.map(|stored| {
-                metrics::counter!("precut_cache_hits_total", "tier" => "store").increment(1);
-                Kept::Answer(stored)
-            }),
-            Err(error) => {
-                tracing::warn!(%error, "the store is passed over");
-                None
-            }
-        }
-    }
-
-    /// A kept answer from the store, kept in memory from now on.
-    async fn fetch(&self, key: &Key) -> Result<Option<Arc<Stored>>, crate::store::StoreError> {
-        let Some(kept) = self.store.get(*key).await? else { return Ok(None) };
-        // A calculator that is no more has no results either.
-        let Some(entry) = self.entry(&kept.calculator) else { return Ok(None) };
-        let stored = Arc::new(Stored { key: *key, body: kept.body, input: kept.input, entry: Arc::clone(entry) });
-        self.memory.keep(*key, Kept::Answer(Arc::clone(&stored)));
-        Ok(Some(stored))
-    }
-
-    fn afford(&self, cost: Cost) -> Result<(), Error> {
-        affordable(cost, self.settings.cost_limit, self.settings.cost_limit_bytes)
-    }
-
-    /// Whether an owner may ask for so much work in an hour at all.
-    fn afford_at_all(&self, cost: &Cost, estimate_ms: f64) -> Result<(), Error> {
-        let (most_ms, limit_bytes) = (self.settings.quota.work_ms, self.settings.cost_limit_bytes);
-        match most_ms.filter(|most_ms| estimate_ms > *most_ms) {
-            Some(most_ms) => Err(Error::TooExpensive {
-                cost: Cost { ms: estimate_ms, ..*cost },
-                limit: Duration::from_secs_f64(most_ms / 1e3),
-                limit_bytes,
-            }),
-            None => Ok(()),
-        }
     }
 
     /// Runs the calculation on the pool.
@@ -453,86 +374,11 @@ impl Inner {
         let outcome = self.keep(ready, outcome, run);
         leader.end(Ended { outcome, timings: Timings { parse: Duration::ZERO, queue, run } });
     }
-
-    /// Keeps what would come out again: answers, and failures that follow from the job alone.
-    fn keep(&self, ready: &Ready, outcome: Result<Stored, Error>, run: Duration) -> Result<Arc<Stored>, Error> {
-        let meta = ready.entry.meta();
-        let label = match &outcome {
-            Ok(_) => "ok",
-            Err(Error::Cancelled) => "cancelled",
-            Err(Error::Crashed | Error::Calculation(Failure::Internal(_))) => "error",
-            Err(_) => "no_answer",
-        };
-        metrics::counter!("precut_calculations_total", "calculator" => meta.id, "outcome" => label).increment(1);
-        metrics::histogram!("precut_calculation_seconds", "calculator" => meta.id).record(run.as_secs_f64());
-        match outcome {
-            Ok(stored) => {
-                let stored = Arc::new(stored);
-                self.memory.keep(ready.key, Kept::Answer(Arc::clone(&stored)));
-                self.store.put(stored.kept());
-                Ok(stored)
-            }
-            Err(Error::Calculation(failure)) => {
-                match &failure {
-                    Failure::Infeasible(_)
-                    | Failure::Conflicting(_)
-                    | Failure::OutOfModel(_)
-                    | Failure::NotRead { .. }
-                    | Failure::NotConverged { .. } => {
-                        self.memory.keep(ready.key, Kept::Failure(failure.clone()));
-                    }
-                    Failure::Internal(reason) => {
-                        tracing::error!(calculator = meta.id, key = %ready.key, reason, "a calculation failed");
-                    }
-                    Failure::Cancelled => {}
-                }
-                Err(Error::Calculation(failure))
-            }
-            Err(error) => {
-                if error == Error::Crashed {
-                    tracing::error!(calculator = meta.id, key = %ready.key, "a calculation crashed");
-                }
-                Err(error)
-            }
-        }
-    }
-}
-
-/// Whether a job may cost so much.
-fn affordable(cost: Cost, limit: Duration, limit_bytes: u64) -> Result<(), Error> {
-    // An estimate that is no number is not below the limit.
-    let is_affordable = cost.ms <= limit.as_secs_f64() * 1e3 && cost.bytes <= limit_bytes;
-    if is_affordable { Ok(()) } else { Err(Error::TooExpensive { cost, limit, limit_bytes }) }
-}
-
-fn outcome(kept: Kept) -> Result<Arc<Stored>, Error> {
-    match kept {
-        Kept::Answer(stored) => Ok(stored),
-        Kept::Failure(failure) => Err(Error::Calculation(failure)),
-    }
-}
-
-fn hit(kept: Kept, parse: Duration) -> Result<Solved, Error> {
-    let timings = Timings { parse, ..Timings::default() };
-    Ok(Solved { stored: outcome(kept)?, cache: CacheState::Hit, timings })
 }
 
 /// A body as JSON, whatever it is.
 pub(crate) fn parsed(body: &[u8]) -> Result<serde_json::Value, Error> {
     json::parse(body)
-}
-
-/// What is asked under a name, without an engine.
-fn entry(registry: &Registry, calculator: &str) -> Result<Arc<Entry>, Error> {
-    if calculator == STUDIES {
-        return Ok(studies_of(registry));
-    }
-    registry.entry(calculator).cloned().ok_or_else(|| Error::unknown(registry, calculator))
-}
-
-/// Parameter studies over the calculators of a registry, without an engine: nothing is kept.
-pub fn studies_of(registry: &Registry) -> Arc<Entry> {
-    Arc::new(study::entry(registry, study::MOST_POINTS, Arc::new(study::Alone)))
 }
 
 /// Runs a job and writes its answer.
@@ -550,41 +396,4 @@ fn compute(ready: &Ready, monitor: &dyn Monitor) -> Result<Stored, Error> {
         Err(Failure::Cancelled) => Err(Error::Cancelled),
         Err(failure) => Err(Error::Calculation(failure)),
     }
-}
-
-/// Everything but the calculation, without an engine.
-#[allow(clippy::needless_pass_by_value)] // a body is handed over, here as to an engine
-pub fn check_now(registry: &Registry, calculator: &str, body: Body) -> Result<Checked, Error> {
-    check_with(registry, calculator, body, &Given::default())
-}
-
-/// The same with what its names mean.
-#[allow(clippy::needless_pass_by_value)]
-pub fn check_with(registry: &Registry, calculator: &str, body: Body, given: &Given) -> Result<Checked, Error> {
-    let entry = entry(registry, calculator)?;
-    guarded(|| given.read(registry, &entry, &body)?.into_checked())
-}
-
-/// The answer to a job in this thread, without cache or store: for the command line. A job is refused for its cost as by a service
-/// with the usual limits.
-#[allow(clippy::needless_pass_by_value)]
-pub fn solve_now(registry: &Registry, calculator: &str, body: Body, monitor: &dyn Monitor) -> Result<Stored, Error> {
-    solve_with(registry, calculator, body, &Given::default(), monitor)
-}
-
-/// The same with what its names mean.
-#[allow(clippy::needless_pass_by_value)]
-pub fn solve_with(
-    registry: &Registry,
-    calculator: &str,
-    body: Body,
-    given: &Given,
-    monitor: &dyn Monitor,
-) -> Result<Stored, Error> {
-    let entry = entry(registry, calculator)?;
-    guarded(|| {
-        let ready = given.read(registry, &entry, &body)?;
-        affordable(ready.prepared.cost, settings::COST_LIMIT, settings::COST_LIMIT_BYTES)?;
-        compute(&ready, monitor)
-    })
 }

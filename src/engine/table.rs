@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::budget::Room;
 use super::{FilePart, csv_table};
-use crate::registry::{Faults, Step, TablePlace, child, nearest};
+use crate::registry::{Faults, Step, TablePlace, canonical, child, nearest};
 
 /// Where the rows of a table stood in its text, for faults found later.
 pub(crate) struct CsvSource {
@@ -88,8 +88,8 @@ pub(crate) fn without_rows(mut input: Value, places: &[TablePlace]) -> Value {
     for place in places {
         each_at(&mut input, &place.way.0, String::new(), &mut |value, _| {
             if let Value::Array(rows) = value {
-                let canonical = serde_json_canonicalizer::to_vec(rows).expect("rows are JSON with text keys");
-                let hash = blake3::hash(&canonical).to_hex();
+                let text = canonical(rows).expect("rows are JSON with text keys");
+                let hash = blake3::hash(&text).to_hex();
                 *value = json!({ "rows": rows.len(), "b3": hash.as_str() });
             }
         });

@@ -16,7 +16,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::registry::toy;
 use crate::store::sqlite::{Keep, SqliteStore};
-use crate::store::{KeptResult, StoreError};
+use crate::store::{KeptResult, Origin, ResultPage, ResultQuery, StoreError};
 use crate::text::{Language, Texts, complete, kept};
 
 mod golden;
@@ -92,7 +92,7 @@ async fn the_envelope_has_what_every_answer_has_and_nothing_volatile() {
         json!([{"pointer": "/length_mm", "code": "toy_is_slender", "detail": "500 mm is above 100 mm", "value": 500.0,
                 "limit": 100.0, "unit": "mm"}])
     );
-    let alone = solve_now(engine.registry(), TOY, body(), &Unwatched).unwrap();
+    let alone = solve_now(engine.registry(), TOY, body(), &Given::default(), &Unwatched).unwrap();
     assert_eq!(alone.body, solved.stored.body);
     assert_eq!(alone.key, solved.stored.key);
 }
@@ -182,7 +182,7 @@ async fn a_job_above_the_limit_is_refused_with_the_field_that_drives_it() {
     engine.solve(TOY, work(10_000.0)).await.unwrap();
     // Without an engine, on the command line, the usual limit holds.
     let hour_ms = super::settings::COST_LIMIT.as_secs_f64() * 1e3;
-    let refused = solve_now(engine.registry(), TOY, work(1.01 * hour_ms), &Unwatched).unwrap_err();
+    let refused = solve_now(engine.registry(), TOY, work(1.01 * hour_ms), &Given::default(), &Unwatched).unwrap_err();
     assert!(
         matches!(refused, Error::TooExpensive { limit, .. } if limit == super::settings::COST_LIMIT),
         "{refused:?}"
@@ -263,7 +263,7 @@ async fn unknown_names_come_with_the_nearest() {
     let error = engine.solve("toy-baar", job(|_| {})).await.unwrap_err();
     assert_eq!(error, Error::UnknownCalculator { name: "toy-baar".to_owned(), nearest: Some(TOY) });
     assert_eq!(
-        check_now(&toy::registry(), TOY, job(|_| {})).unwrap().key,
+        check_now(&toy::registry(), TOY, job(|_| {}), &Given::default()).unwrap().key,
         engine.solve(TOY, job(|_| {})).await.unwrap().stored.key
     );
 }
@@ -407,7 +407,8 @@ async fn a_store_that_fails_fails_no_answer() {
     let solved = engine.solve(TOY, job(|_| {})).await.unwrap();
     assert_eq!(engine.solve(TOY, job(|_| {})).await.unwrap().cache, CacheState::Hit);
     assert!(engine.result(&solved.stored.key).await.unwrap().is_some());
-    let other = check_now(&toy::registry(), TOY, job(|job| job["length_mm"] = json!(700))).unwrap().key;
+    let other =
+        check_now(&toy::registry(), TOY, job(|job| job["length_mm"] = json!(700)), &Given::default()).unwrap().key;
     assert!(matches!(engine.result(&other).await, Err(Error::Store(StoreError::Failed(_)))));
     assert!(matches!(engine.ready().await, Err(Error::Store(StoreError::Failed(_)))));
 }
@@ -422,7 +423,8 @@ fn answered(calculator: &str, example: &str) -> Option<&'static Stored> {
         let examples: Vec<_> =
             registry.entries().iter().flat_map(|entry| of_entry(entry.meta().id, entry.meta().examples)).collect();
         let answered = |(id, example): &(&'static str, &'static Example)| {
-            let stored = solve_now(&registry, id, Body::Json(example.job.into()), &Unwatched);
+            let body = Body::Json(example.job.into());
+            let stored = solve_now(&registry, id, body, &Given::default(), &Unwatched);
             (format!("{id}/{}", example.id), stored.unwrap_or_else(|error| panic!("{} of {id}: {error:?}", example.id)))
         };
         examples.par_iter().map(answered).collect()
@@ -564,7 +566,7 @@ fn a_cancel_is_heard_while_a_job_is_computed_without_its_model() {
         Given { model: Some(ModelFile::read(&registry, model.to_string().as_bytes()).unwrap()), ..Given::default() };
     let solve = |job: &Value, model: &Given, most: usize| {
         let monitor = Impatient { looks: 0.into(), most, told: 0.into() };
-        let outcome = solve_with(&registry, SHAFT, Body::Json(job.to_string().into()), model, &monitor);
+        let outcome = solve_now(&registry, SHAFT, Body::Json(job.to_string().into()), model, &monitor);
         (outcome, monitor.looks.into_inner(), monitor.told.into_inner())
     };
     let own = shaft(|job| job["effects"] = json!([soft_headstock()]));

@@ -3,7 +3,7 @@
 use precut_calc::calculator::{Finding, Monitor};
 use serde_json::Value;
 
-use super::{Body, Error, Given, check_with, json};
+use super::{Body, Error, Given, check_now, json};
 use crate::registry::{NotReplayed, Registry, Replayed, child};
 
 /// Fields that a part states among its conditions and that are no condition of the calculator's.
@@ -45,7 +45,7 @@ fn fill_jobs(registry: &Registry, calculator: &str, process: &mut Value) -> Resu
     let mut faults = Vec::new();
     for (name, of_type) in types.into_iter().flatten() {
         let Some(job) = of_type.get_mut("job") else { continue };
-        match check_with(registry, calculator, Body::Json(job.to_string().into()), &Given::default()) {
+        match check_now(registry, calculator, Body::Json(job.to_string().into()), &Given::default()) {
             Ok(checked) => *job = checked.input,
             Err(Error::Invalid { findings, .. }) => {
                 let pointer = child(&child("/part_types", name), "job");

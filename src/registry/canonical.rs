@@ -1,8 +1,7 @@
 //! Canonical JSON (RFC 8785) of typed values, in one buffer.
 //!
 //! Members are written as they come, noted, and put in order when their object ends. `serde_json_canonicalizer` gives
-//! every name and value a buffer of its own; it stays the measure in the test, and writes what is not written for
-//! every job.
+//! every name and value a buffer of its own; it stays the measure in the tests.
 
 use std::cmp::Ordering;
 use std::io;

@@ -1,31 +1,24 @@
 //! One calculator with its types closed over.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::marker::PhantomData;
-use std::sync::Arc;
+mod contracts;
+
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use precut_calc::calculator::{
-    Answer, Basis, Calculator, Check, Cost, Diagnosable, Failure, Figure, Finding, ForwardModel, Message, Meta,
-    Monitor, Place, Program, ReturnedProgram, Table, Violations, Watched,
-};
+use precut_calc::calculator::{Calculator, Diagnosable, Figure, Finding, ForwardModel, Meta, Place, Table, Watched};
 use precut_calc::diagnosis::{Diagnosis, JobOf, ResultOf};
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 use utoipa::ToSchema;
 use utoipa::openapi::{RefOr, Schema};
 
-use super::canonical::canonical;
+use super::calculation::{Calculation, MaybeProgram, MaybeReturned, Moved, Prepared, Unprepared, UnreadableResult};
 use super::checker::{Checker, Faults};
-use super::contract::{self, Contract, Make};
-use super::place::{Places, TablePlace, TextPlace, places};
-use super::schema::Components;
+use super::contract::{self, Make};
+use super::place::{Places, TablePlace, TextPlace};
 use super::shape::Shape;
+use super::typed::{NoCalculator, Typed};
 use super::watched::Observed;
-use super::{RESERVED, RegistryError, Unwritable, append_result, child, non_finite_place};
-use super::{family, names};
+use super::{RESERVED, RegistryError, family, names};
 
 /// One calculator with its types closed over.
 pub struct Entry {
@@ -150,13 +143,13 @@ impl Entry {
             return Err(RegistryError::Reserved(meta.id));
         }
         let output = contract::of::<C::Output>(meta.id, false, |_| {});
-        Ok(Self::new(&meta, Contracts::Types { input, output }, Box::new(Typed::<C>(PhantomData))))
+        Ok(Self::new(&meta, Contracts::Types { input, output }, Box::new(Typed::<C>::new(None))))
     }
 
     /// The entry of the diagnosis of one calculator.
     pub(super) fn of_diagnosis<M: Diagnosable>() -> Self {
         let base = M::META;
-        let calculation = Box::new(NumbersOf { meta: base, calculation: Typed::<Diagnosis<M>>(PhantomData) });
+        let calculation = Box::new(Typed::<Diagnosis<M>>::new(Some(&base)));
         let input = contract::of::<JobOf<M>>(base.id, true, move |job| {
             family::name_calculator(job, base.id);
             family::offer_model(job);
@@ -234,134 +227,10 @@ impl Entry {
         self.member(&named.calculator).ok_or_else(|| unreadable(format!("no calculator {}", named.calculator)))
     }
 
-    fn made_input(&self) -> Result<Contract, RegistryError> {
-        match &self.contracts {
-            Contracts::Types { input, .. } => input(),
-            Contracts::Members(members) => {
-                let part = |of: &Member| Ok((family::type_name(of.calculator, "DiagnosisJob"), of.entry.made_input()?));
-                Contract::joined(members.iter().map(part), true)
-            }
-        }
-    }
-
-    fn made_output(&self) -> Result<Contract, RegistryError> {
-        match &self.contracts {
-            Contracts::Types { output, .. } => output(),
-            Contracts::Members(members) => {
-                let part =
-                    |of: &Member| Ok((family::type_name(of.calculator, "DiagnosisResult"), of.entry.made_output()?));
-                Contract::joined(members.iter().map(part), false)
-            }
-        }
-    }
-
-    fn input(&self) -> Contract {
-        follows(self.made_input())
-    }
-    fn output(&self) -> Contract {
-        follows(self.made_output())
-    }
-
-    /// What jobs are held against; where stands what may come as files is read off the same schema.
-    fn checker(&self) -> &Checker {
-        let made = || match self.members() {
-            [] => {
-                let strict = follows(self.input().strict());
-                self.files.get_or_init(|| places(&strict));
-                Checker::new(strict)
-            }
-            members => of_members(members),
-        };
-        self.checker.get_or_init(|| follows(made()))
-    }
-
-    /// Makes all that is made on demand, so that what cannot be made is known at once; `components` are those of the
-    /// entries before.
-    pub(super) fn verify(&self, components: &mut Components) -> Result<(), RegistryError> {
-        for member in self.members() {
-            member.entry.verify(components)?;
-        }
-        let (input, output) = (self.made_input()?, self.made_output()?);
-        for contract in [&input, &output] {
-            contract.schema()?;
-            contract.components()?;
-        }
-        let strict = input.strict()?;
-        let _ = self.files.set(places(&strict));
-        let checker = match self.members() {
-            [] => Checker::new(strict),
-            members => of_members(members),
-        };
-        let _ = self.checker.set(checker?);
-        let _ = self.strict_output.set(output.strict()?);
-        for (name, component) in input.into_open().into_iter().chain(output.into_open()) {
-            if components.get(&name).is_some_and(|other| *other != component) {
-                return Err(RegistryError::ComponentClash { component: name, calculator: self.meta.id });
-            }
-            components.insert(name, component);
-        }
-        Ok(())
-    }
-
     /// What stands on the door.
     pub fn meta(&self) -> &Meta {
         &self.meta
     }
-    /// What the OpenAPI document says of job and result.
-    pub fn schemas(&self) -> Schemas {
-        let made = || {
-            let (input, output) = (self.made_input()?, self.made_output()?);
-            let mut components = output.components()?;
-            components.extend(input.components()?);
-            let components = components.into_iter().collect();
-            Ok(Schemas { input: input.schema()?, output: output.schema()?, components })
-        };
-        follows(made())
-    }
-    pub(super) fn input_components(&self) -> BTreeMap<String, RefOr<Schema>> {
-        follows(self.input().components())
-    }
-    pub(super) fn output_components(&self) -> BTreeMap<String, RefOr<Schema>> {
-        follows(self.output().components())
-    }
-    /// Self-contained JSON Schema (2020-12) of the job.
-    pub fn input_document(&self) -> Value {
-        self.input().document()
-    }
-    /// Self-contained JSON Schema (2020-12) of the result.
-    pub fn output_document(&self) -> Value {
-        self.output().document()
-    }
-    /// Whether the job takes measured tables (CSV in place, or file parts).
-    pub fn takes_tables(&self) -> bool {
-        !self.files().tables.is_empty()
-    }
-    /// Whether anything of the job may come as a file part.
-    pub fn takes_files(&self) -> bool {
-        self.takes_tables() || !self.files().texts.is_empty()
-    }
-    /// Names of its measured tables, with dots from the root.
-    pub fn table_names(&self) -> Vec<String> {
-        self.files().tables.iter().map(|place| place.way.dotted()).collect()
-    }
-    /// Names of its long texts that may come as file parts, in the same way.
-    pub fn text_names(&self) -> Vec<String> {
-        self.files().texts.iter().map(|place| place.way.dotted()).collect()
-    }
-    fn files(&self) -> &Places {
-        self.files.get_or_init(|| places(&follows(self.input().strict())))
-    }
-    /// Every code that it may utter: those of its declaration and those of its fields.
-    pub fn codes(&self) -> BTreeSet<String> {
-        let mut codes: BTreeSet<String> =
-            self.meta.codes.all().chain(self.more_codes.iter().copied()).map(str::to_owned).collect();
-        for member in self.members() {
-            codes.extend(member.entry.more_codes.iter().map(|code| (*code).to_owned()));
-        }
-        codes_in(self.strict_input(), &mut codes);
-        codes
-    }
-
     /// A buffer for the next answer, about as large as the last one was.
     pub(crate) fn answer_buffer(&self) -> Vec<u8> {
         /// Answers differ by some digits and words.
@@ -515,298 +384,4 @@ impl std::fmt::Debug for Entry {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Entry").field("id", &self.meta.id).field("version", &self.meta.version).finish_non_exhaustive()
     }
-}
-
-/// What a job is held against that names no member. One that does is held against that member's own schema: all of them
-/// in one would be the largest schema of all.
-fn of_members(members: &[Member]) -> Result<Checker, RegistryError> {
-    Checker::new(family::told_apart(members.iter().map(|of| of.calculator)))
-}
-
-fn codes_in(schema: &Value, codes: &mut BTreeSet<String>) {
-    match schema {
-        Value::Object(map) => {
-            if let Some(Value::String(code)) = map.get("x-code") {
-                codes.insert(code.clone());
-            }
-            map.values().for_each(|part| codes_in(part, codes));
-        }
-        Value::Array(parts) => parts.iter().for_each(|part| codes_in(part, codes)),
-        _ => {}
-    }
-}
-
-/// A job that can run.
-pub struct Prepared {
-    /// What it would cost.
-    pub cost: Cost,
-    /// The job with every default filled in, as RFC 8785 writes it.
-    pub canonical: Vec<u8>,
-    /// The calculator whose numbers come out, where that is another one.
-    pub(crate) numbers_of: Option<Meta>,
-    job: Box<dyn Job>,
-}
-
-impl Prepared {
-    pub(crate) fn new(cost: Cost, canonical: Vec<u8>, job: Box<dyn Job>) -> Self {
-        Self { cost, canonical, numbers_of: None, job }
-    }
-    /// The same with numbers that another calculator makes: its version counts, too.
-    pub(crate) fn with_numbers_of(self, meta: &Meta) -> Self {
-        Self { numbers_of: Some(*meta), ..self }
-    }
-    /// The job with every default filled in.
-    pub fn input(&self) -> Result<Value, Failure> {
-        self.job.input()
-    }
-    /// Appends the same as JSON, its fields in the order of their declaration.
-    pub fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        self.job.write_input(body)
-    }
-    /// Computes the answer and appends its result as JSON, every number finite.
-    pub fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
-        self.job.run(monitor, body)
-    }
-    /// Its shards, if it is worth to compute them apart.
-    pub(crate) fn sharded(&self) -> Option<Arc<dyn Sharded>> {
-        self.job.sharded()
-    }
-}
-
-/// Why a job cannot run.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Unprepared {
-    /// It breaks rules.
-    Invalid(Vec<Finding>),
-    /// Our own fault.
-    Failed(Failure),
-}
-
-/// What an answer has beside its result.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ResultNotes {
-    /// Where an input leaves a formula's range of validity, and the like.
-    pub warnings: Vec<Finding>,
-    /// Most important first.
-    pub explanation: Vec<Message>,
-    /// The equations used.
-    pub basis: Vec<Basis>,
-}
-
-/// A kept result that the calculator's types no longer read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct UnreadableResult(pub String);
-
-type MaybeProgram = Option<Result<Program, Failure>>;
-type MaybeReturned = Option<Result<ReturnedProgram, Failure>>;
-
-/// A job, and what becomes of it at another place of a picture.
-pub(crate) struct Moved {
-    pub(crate) before: Value,
-    pub(crate) after: Value,
-}
-
-/// What an entry does, whatever its types are.
-pub(crate) trait Calculation: Send + Sync {
-    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared>;
-    fn broken_rules(&self, job: &Value) -> Vec<Finding>;
-    /// What is wrong with a job that stands inside, of which the heads of long lists are there.
-    fn faults_of_head(&self, _job: &Value) -> Vec<Finding> {
-        Vec::new()
-    }
-    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult>;
-    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult>;
-    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult>;
-    /// What is made of other calculators' jobs brings no program along.
-    fn returned(&self, _input: &[u8], _envelope: &[u8], _made_by: &str) -> Result<MaybeReturned, UnreadableResult> {
-        Ok(None)
-    }
-    /// What has no places of its own stands where it is.
-    fn at_place(&self, _input: &[u8], _envelope: &[u8], _place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
-        Ok(None)
-    }
-}
-
-/// A filled job.
-pub(crate) trait Job: Send + Sync {
-    fn input(&self) -> Result<Value, Failure>;
-    fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure>;
-    fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure>;
-    /// Its shards, if it is worth to compute them apart: what is taken up of them, `run` does not compute.
-    fn sharded(&self) -> Option<Arc<dyn Sharded>> {
-        None
-    }
-}
-
-/// A job in shards: each can be computed by itself, by whoever has a place, and comes to the same.
-pub(crate) trait Sharded: Send + Sync {
-    /// How many there are.
-    fn count(&self) -> usize;
-    /// What a shard comes to; `apart`: what may end its process is computed in one of its own.
-    fn compute(&self, index: usize, monitor: &dyn Monitor, apart: bool) -> Result<Vec<u8>, Unfinished>;
-    /// Takes up what a shard came to; whether it is that.
-    fn take_up(&self, index: usize, content: &[u8]) -> bool;
-    /// Tells how far it is by what was taken up.
-    fn tell(&self, monitor: &dyn Monitor);
-}
-
-/// Why a shard came to nothing.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Unfinished {
-    /// Nobody wants it any more.
-    Cancelled,
-    /// It ended the process that it was tried in.
-    Deadly,
-    /// Our own fault.
-    Failed(Failure),
-}
-
-/// The types of a calculator.
-struct Typed<C>(PhantomData<fn() -> C>);
-
-/// A calculation whose numbers are another calculator's, too.
-struct NumbersOf<T> {
-    meta: Meta,
-    calculation: T,
-}
-
-impl<T: Calculation> Calculation for NumbersOf<T> {
-    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        Ok(self.calculation.prepare(job)?.with_numbers_of(&self.meta))
-    }
-    fn broken_rules(&self, job: &Value) -> Vec<Finding> {
-        self.calculation.broken_rules(job)
-    }
-    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
-        self.calculation.figures(input, envelope)
-    }
-    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
-        self.calculation.tables(input, envelope)
-    }
-    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
-        self.calculation.program(input, envelope)
-    }
-}
-
-/// What a family does with a job that names none of its calculators; the schema has refused such a job before.
-struct NoCalculator;
-
-impl Calculation for NoCalculator {
-    fn prepare(&self, _job: &Value) -> Result<Prepared, Unprepared> {
-        Err(Unprepared::Failed(Failure::Internal("a job of no calculator".to_owned())))
-    }
-    fn broken_rules(&self, _job: &Value) -> Vec<Finding> {
-        Vec::new()
-    }
-    fn figures(&self, _input: &[u8], _envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
-        Err(UnreadableResult("a job of no calculator".to_owned()))
-    }
-    fn tables(&self, _input: &[u8], _envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
-        Err(UnreadableResult("a job of no calculator".to_owned()))
-    }
-    fn program(&self, _input: &[u8], _envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
-        Err(UnreadableResult("a job of no calculator".to_owned()))
-    }
-}
-
-/// A filled job of a calculator.
-struct TypedJob<C: Calculator>(C::Input);
-
-impl<C: Calculator> Calculation for Typed<C> {
-    fn prepare(&self, job: &Value) -> Result<Prepared, Unprepared> {
-        // The way to a fault is noted on a second reading only: noting it costs more than reading.
-        let mut input = C::Input::deserialize(job).or_else(|_| {
-            serde_path_to_error::deserialize(job).map_err(|error| Unprepared::Invalid(vec![second_line(&error)]))
-        })?;
-        let mut violations = Violations::default();
-        input.check(&mut violations);
-        if !violations.is_empty() {
-            return Err(Unprepared::Invalid(violations.into_vec()));
-        }
-        C::fill(&mut input);
-        if let Some(place) = non_finite_place(&input) {
-            let what = format!("the filled job of {} is not finite at {place}", C::META.id);
-            return Err(Unprepared::Failed(Failure::Internal(what)));
-        }
-        let canonical = canonical(&input).map_err(|error| Unprepared::Failed(unwritable("the filled job", &error)))?;
-        Ok(Prepared::new(C::cost(&input), canonical, Box::new(TypedJob::<C>(input))))
-    }
-    fn broken_rules(&self, job: &Value) -> Vec<Finding> {
-        let mut violations = Violations::default();
-        if let Ok(input) = C::Input::deserialize(job) {
-            input.check(&mut violations);
-        }
-        violations.into_vec()
-    }
-    fn figures(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Figure>, UnreadableResult> {
-        let (input, output) = read::<C>(input, envelope)?;
-        Ok(C::figures(&input, &output))
-    }
-    fn tables(&self, input: &[u8], envelope: &[u8]) -> Result<Vec<Table>, UnreadableResult> {
-        let (input, output) = read::<C>(input, envelope)?;
-        Ok(C::tables(&input, &output))
-    }
-    fn program(&self, input: &[u8], envelope: &[u8]) -> Result<MaybeProgram, UnreadableResult> {
-        let (input, output) = read::<C>(input, envelope)?;
-        Ok(C::program(&input, &output))
-    }
-    fn returned(&self, input: &[u8], envelope: &[u8], made_by: &str) -> Result<MaybeReturned, UnreadableResult> {
-        let (input, output) = read::<C>(input, envelope)?;
-        Ok(C::returned(&input, &output, made_by))
-    }
-    fn at_place(&self, input: &[u8], envelope: &[u8], place: &Place<'_>) -> Result<Option<Moved>, UnreadableResult> {
-        let (input, output) = read::<C>(input, envelope)?;
-        let Some(after) = C::at_place(&input, &output, place) else { return Ok(None) };
-        let written = |job: &C::Input| serde_json::to_value(job).map_err(|error| UnreadableResult(error.to_string()));
-        Ok(Some(Moved { before: written(&input)?, after: written(&after)? }))
-    }
-}
-
-impl<C: Calculator> Job for TypedJob<C> {
-    fn input(&self) -> Result<Value, Failure> {
-        serde_json::to_value(&self.0).map_err(|error| unwritable("the filled job", &error))
-    }
-    fn write_input(&self, body: &mut Vec<u8>) -> Result<(), Failure> {
-        serde_json::to_writer(body, &self.0).map_err(|error| unwritable("the filled job", &error))
-    }
-    fn run(&self, monitor: &dyn Monitor, body: &mut Vec<u8>) -> Result<ResultNotes, Failure> {
-        let Answer { output, warnings, explanation, basis } = C::run(&self.0, monitor)?;
-        append_result(body, &output).map_err(|error| match error {
-            Unwritable::NotFinite => {
-                let place = non_finite_place(&output).unwrap_or_default();
-                Failure::Internal(format!("the result of {} is not finite at {place}", C::META.id))
-            }
-            Unwritable::Other(_) => unwritable("the result", &error),
-        })?;
-        Ok(ResultNotes { warnings, explanation, basis })
-    }
-}
-
-fn unwritable(what: &str, error: &impl std::fmt::Display) -> Failure {
-    Failure::Internal(format!("{what}: {error}"))
-}
-
-/// What is read of an envelope.
-#[derive(Deserialize)]
-struct Answered<O> {
-    result: O,
-}
-
-fn read<C: Calculator>(input: &[u8], envelope: &[u8]) -> Result<(C::Input, C::Output), UnreadableResult> {
-    fn json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, UnreadableResult> {
-        serde_json::from_slice(bytes).map_err(|error| UnreadableResult(error.to_string()))
-    }
-    Ok((json::<C::Input>(input)?, json::<Answered<C::Output>>(envelope)?.result))
-}
-
-/// What the types refuse although the schema does not: one fault, as deserialisation stops at the first.
-pub(crate) fn second_line(error: &serde_path_to_error::Error<serde_json::Error>) -> Finding {
-    use serde_path_to_error::Segment;
-    let pointer = error.path().iter().fold(String::new(), |pointer, segment| match segment {
-        Segment::Seq { index } => format!("{pointer}/{index}"),
-        Segment::Map { key } => child(&pointer, key),
-        Segment::Enum { .. } | Segment::Unknown => pointer,
-    });
-    Finding::new("not_readable", pointer).with("reason", error.inner().to_string())
 }

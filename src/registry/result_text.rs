@@ -10,6 +10,8 @@ use serde::ser::{
     SerializeTupleVariant, Serializer,
 };
 
+use super::child;
+
 /// Why a value cannot be written.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub(crate) enum Unwritable {
@@ -30,6 +32,51 @@ impl ser::Error for Unwritable {
 /// Appends `value` as `serde_json` would write it; a number that is not finite stops the writing.
 pub(crate) fn append<T: Serialize + ?Sized>(text: &mut Vec<u8>, value: &T) -> Result<(), Unwritable> {
     value.serialize(Pen { page: &mut Page { text, last: None } })
+}
+
+/// JSON Pointer to the first number of `value` that is not finite.
+pub(crate) fn non_finite_place<T: Serialize + ?Sized>(value: &T) -> Option<String> {
+    let mut text = Vec::new();
+    (append(&mut text, value) == Err(Unwritable::NotFinite)).then(|| broken_off(&text))
+}
+
+/// Where the text of a value was broken off, as a JSON Pointer: before an item of a list, or behind the name of a field.
+fn broken_off(text: &[u8]) -> String {
+    /// A list with its items so far, or an object with the field that it has come to.
+    enum Open {
+        List(usize),
+        Object(String),
+    }
+    let mut open = Vec::new();
+    let mut rest = text;
+    while let Some((&byte, behind)) = rest.split_first() {
+        rest = behind;
+        match (byte, open.last_mut()) {
+            (b'[', _) => open.push(Open::List(0)),
+            (b'{', _) => open.push(Open::Object(String::new())),
+            (b']' | b'}', _) => drop(open.pop()),
+            (b',', Some(Open::List(items))) => *items += 1,
+            (b'"', place) => {
+                let mut escaped = false;
+                let ends = |byte: &u8| {
+                    let is_end = *byte == b'"' && !escaped;
+                    escaped = *byte == b'\\' && !escaped;
+                    is_end
+                };
+                let end = behind.iter().position(ends).unwrap_or(behind.len());
+                rest = behind.get(end + 1..).unwrap_or_default();
+                if let (Some(Open::Object(field)), Some(b':')) = (place, rest.first()) {
+                    *field = serde_json::from_slice(&text[text.len() - behind.len() - 1..text.len() - rest.len()])
+                        .unwrap_or_default();
+                }
+            }
+            _ => {}
+        }
+    }
+    open.iter().fold(String::new(), |pointer, open| match open {
+        Open::List(items) => format!("{pointer}/{items}"),
+        Open::Object(field) => child(&pointer, field),
+    })
 }
 
 /// What is written on.
@@ -371,6 +418,19 @@ mod tests {
             assert_eq!(text(&vec![Some(1.0), Some(bad)]), Err(Unwritable::NotFinite));
         }
         assert_eq!(text(&f32::NAN), Err(Unwritable::NotFinite));
+    }
+
+    #[test]
+    fn the_place_of_a_number_that_is_none_is_named() {
+        let fine = (vec![None, Some((1.0, 2.0))], Tagged::Round { radius_mm: 1.0 });
+        assert_eq!(non_finite_place(&fine), None);
+        let bad = BTreeMap::from([("rows", vec![None, Some((1.0, f64::NAN))])]);
+        assert_eq!(non_finite_place(&bad).as_deref(), Some("/rows/1/1"));
+        let bad = BTreeMap::from([("a \"}],[:\\", vec![("x:,\\\"", 1.0)]), ("b/c", vec![("[", 2.0), ("{", f64::NAN)])]);
+        assert_eq!(non_finite_place(&bad).as_deref(), Some("/b~1c/1/1"));
+        assert_eq!(non_finite_place(&f64::NAN).as_deref(), Some(""));
+        let bad = BTreeMap::from([("shape", Tagged::Round { radius_mm: f64::INFINITY })]);
+        assert_eq!(non_finite_place(&bad).as_deref(), Some("/shape/radius_mm"));
     }
 
     #[test]

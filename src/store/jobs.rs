@@ -2,219 +2,25 @@
 //!
 //! The records are the queue: those that wait, in the order of priority and turn. Who takes one holds it under a lease.
 
-use std::fmt;
-use std::str::FromStr;
-use std::sync::{Arc, Mutex, PoisonError};
+mod names;
+
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
 use futures_util::future::BoxFuture;
-use uuid::{ContextV7, Timestamp, Uuid};
 
 pub use super::callbacks::{Callback, CallbackState, DueCallback, NewCallback, Subject, TakeUp, Tried};
 pub use super::quota::{Quota, Usage};
 use super::{KeptResult, StoreError};
 use crate::key::Key;
+pub(crate) use names::yields_to;
+pub use names::{BadJobId, JobId, JobState, Lease, Priority, ShardId};
 
 /// Starts after which a job that takes its process along is given up.
 pub(crate) const MOST_ATTEMPTS: u32 = 3;
 /// A computation that says nothing for so long has lost its lease, and so has who waits to run a job alone.
 pub(crate) const SILENCE: Duration = Duration::from_secs(4);
-
-/// This is not the name of a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a job's id is a UUID in lower case with hyphens")]
-pub struct BadJobId;
-
-/// A job's name, in the order of time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct JobId(Uuid);
-
-impl JobId {
-    /// A new one, after all before.
-    pub fn new() -> Self {
-        Self::at(super::now_ms())
-    }
-
-    /// A new one at some time, ms UTC, after all before of that time.
-    pub fn at(now_ms: i64) -> Self {
-        /// Counts within a millisecond.
-        static CONTEXT: Mutex<ContextV7> = Mutex::new(ContextV7::new());
-        let now_ms = now_ms.max(0).unsigned_abs();
-        let nanos = u32::try_from(now_ms % 1000).unwrap_or(0) * 1_000_000;
-        let context = CONTEXT.lock().unwrap_or_else(PoisonError::into_inner);
-        Self(Uuid::new_v7(Timestamp::from_unix(&*context, now_ms / 1000, nanos)))
-    }
-}
-
-impl JobId {
-    /// The name of a shard: in the order of its number, and before all other jobs of whatever time.
-    fn of_shard(shard: &ShardId) -> Self {
-        let mut bytes = [0; 16];
-        bytes[1..12].copy_from_slice(&shard.parent.as_bytes()[..11]);
-        bytes[12..].copy_from_slice(&shard.number.to_be_bytes());
-        // Version 8, of the variant of all others.
-        bytes[6] = 0x80 | (bytes[6] & 0x0f);
-        bytes[8] = 0x80 | (bytes[8] & 0x3f);
-        Self(Uuid::from_bytes(bytes))
-    }
-
-    /// Of a shard the name by which there is news of all shards of its parent.
-    pub(crate) fn of_siblings(self) -> Option<Self> {
-        let mut bytes = self.0.into_bytes();
-        let is_shard = bytes[0] == 0 && bytes[6] >> 4 == 8;
-        bytes[12..].fill(0xff);
-        is_shard.then_some(Self(Uuid::from_bytes(bytes)))
-    }
-}
-
-impl Default for JobId {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl fmt::Display for JobId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&self.0.hyphenated(), f)
-    }
-}
-
-impl FromStr for JobId {
-    type Err = BadJobId;
-    fn from_str(text: &str) -> Result<Self, BadJobId> {
-        // As it is written here: braces, capitals and the form without hyphens would be other addresses of one job.
-        let read = Uuid::try_parse(text).map(Self).map_err(|_| BadJobId)?;
-        if read.to_string() == text { Ok(read) } else { Err(BadJobId) }
-    }
-}
-
-/// The right to run a computation: whoever has lost it cannot write any more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Lease(Uuid);
-
-impl Lease {
-    /// A new one.
-    pub fn new() -> Self {
-        Self(Uuid::now_v7())
-    }
-}
-
-impl Default for Lease {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl fmt::Display for Lease {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(&self.0.simple(), f)
-    }
-}
-
-impl FromStr for Lease {
-    type Err = uuid::Error;
-    fn from_str(text: &str) -> Result<Self, uuid::Error> {
-        Uuid::try_parse(text).map(Self)
-    }
-}
-
-macro_rules! words {
-    ($(#[$about:meta])* $name:ident { $($(#[$each:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
-        $(#[$about])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum $name { $($(#[$each])* $variant),+ }
-
-        impl $name {
-            /// All of them.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// As it is written.
-            pub const fn word(self) -> &'static str {
-                match self { $(Self::$variant => $word),+ }
-            }
-
-            /// The one that is written so.
-            pub fn of_word(word: &str) -> Option<Self> {
-                Self::ALL.iter().copied().find(|known| known.word() == word)
-            }
-        }
-    };
-}
-
-words! {
-    /// What a job computes.
-    JobKind {
-        /// One answer of one calculator.
-        Calculation = "calculation",
-    }
-}
-
-words! {
-    /// How far a job is.
-    JobState {
-        /// It waits.
-        Queued = "queued",
-        /// It is computed.
-        Running = "running",
-        /// It has its result.
-        Succeeded = "succeeded",
-        /// It has none and says why.
-        Failed = "failed",
-        /// Nobody wants it any more.
-        Cancelled = "cancelled",
-    }
-}
-
-impl JobState {
-    /// Whether nothing more will happen to it.
-    pub const fn is_final(self) -> bool {
-        matches!(self, Self::Succeeded | Self::Failed | Self::Cancelled)
-    }
-}
-
-words! {
-    /// Which jobs go first.
-    Priority {
-        /// When nothing else waits.
-        Low = "low",
-        /// As all others.
-        Normal = "normal",
-        /// Before all others.
-        High = "high",
-    }
-}
-
-/// So many jobs of its priority that came later go before a job of that length, as a rule: the shorter goes first, and who
-/// waits for long comes up, whatever else comes.
-pub(crate) fn yields_to(estimate_ms: f64) -> i64 {
-    /// The longest give way to no more than those of an hour.
-    const LONGEST_S: f64 = 3600.0;
-    #[allow(clippy::cast_possible_truncation)] // 0 to 11
-    let doublings = (1.0 + (estimate_ms / 1e3).clamp(0.0, LONGEST_S)).log2() as i64;
-    doublings
-}
-
-/// Which shard of a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ShardId {
-    /// The key of the job.
-    pub parent: Key,
-    /// The number of the shard, from 0.
-    pub number: u32,
-}
-
-impl ShardId {
-    /// The name that it has as a job.
-    pub(crate) fn job(&self) -> JobId {
-        JobId::of_shard(self)
-    }
-
-    /// The key that it has as a job.
-    pub(crate) fn key(&self) -> Key {
-        Key::of_shard(&self.parent, self.number)
-    }
-}
 
 /// A shard that is over.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -230,8 +36,6 @@ pub struct Shard {
 pub struct NewJob {
     /// Its name.
     pub id: JobId,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// Which version of it.
@@ -277,8 +81,6 @@ pub struct Idempotency {
 pub struct JobRecord {
     /// Its name.
     pub id: JobId,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// Address of its result.
@@ -348,8 +150,6 @@ pub struct Claim {
     pub key: Key,
     /// Which shard it is, if it is one: then there is no input but that of its parent.
     pub shard: Option<ShardId>,
-    /// What it computes.
-    pub kind: JobKind,
     /// By which calculator.
     pub calculator: String,
     /// All that is needed.
@@ -522,10 +322,8 @@ pub enum News {
 /// Who hears of news.
 pub type Hear = Arc<dyn Fn(News) + Send + Sync>;
 
-/// Where jobs are kept and queued. What it has said yes to survives the process.
-pub trait JobStore: Send + Sync + 'static {
-    /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
-    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>>;
+/// What becomes of jobs once they are there: the same in every store.
+pub trait JobShelf: Send + Sync + 'static {
     /// A job's record.
     fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>>;
     /// The jobs, newest first.
@@ -533,36 +331,30 @@ pub trait JobStore: Send + Sync + 'static {
     /// What jobs need to run, compressed, as far as it takes no more than so many bytes; those that have none any more
     /// are left out.
     fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>>;
-    /// How many wait and run, since when, and how large the database is.
-    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
-    /// Whether there is something to do, for [`Wanted::short_ms`].
-    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
-    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start. A shard is taken
-    /// only while its parent runs.
-    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
-    /// Keeps a suspect from others for `SILENCE`.
-    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
-    /// `problem`, if they have been charged `most` already.
-    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
-    /// Ends a computation and all jobs that still want it; which these are. A shard ends only once the results of its points
-    /// are written, and is forgotten with the end of its parent.
-    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
-    /// Puts shards of what runs under a lease in line, also such as are over; those that wait or run stay as they are. One
-    /// of them has the parent's turn, the others go behind all jobs of its priority. Whether the lease holds.
-    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Of these shards those that are over.
     fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>>;
     /// What is needed to run the job of a key that runs.
     fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>>;
-    /// Puts a computation back in line without a charge.
-    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// What an owner takes of the service.
     fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>>;
     /// What is kept of jobs and their results for each owner of keys, bytes.
     fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>>;
     /// Notes the work of answers that were no jobs: whose it was, and how much, ms.
     fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Writes what came of a try; whether it was still who tried that holds it.
+    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// The latest timings, newest first, at most `limit`.
+    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
+    /// Keeps a suspect from others for `SILENCE`.
+    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Takes this job and all equal ones that wait under a lease, and charges them one start; fails them, with
+    /// `problem`, if they have been charged `most` already.
+    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>>;
+    /// Puts shards of what runs under a lease in line, also such as are over; those that wait or run stay as they are. One
+    /// of them has the parent's turn, the others go behind all jobs of its priority. Whether the lease holds.
+    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Puts a computation back in line without a charge.
+    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Fails an owner's jobs of a computation that has not begun, with `problem`, and puts the others back in line, without
     /// a charge; which have failed.
     fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
@@ -570,6 +362,22 @@ pub trait JobStore: Send + Sync + 'static {
     fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>>;
     /// Puts a job whose result is damaged back in line.
     fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>>;
+}
+
+/// Where jobs are kept and queued. What it has said yes to survives the process.
+pub trait JobStore: JobShelf {
+    /// Puts a job on record and in line, both or neither; refused with more than `queue_limit` waiting.
+    fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>>;
+    /// How many wait and run, since when, and how large the database is.
+    fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>>;
+    /// Whether there is something to do, for [`Wanted::short_ms`].
+    fn waits(&self, short_ms: Option<f64>) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Takes the next job in line and all equal ones that wait under a lease, and charges them one start. A shard is taken
+    /// only while its parent runs.
+    fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>>;
+    /// Ends a computation and all jobs that still want it; which these are. A shard ends only once the results of its points
+    /// are written, and is forgotten with the end of its parent.
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Notes how far computations are; which of them nobody wants any more.
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>>;
     /// Fails, with `problem`, what is past its deadline; and when the next deadline is, ms UTC.
@@ -579,14 +387,10 @@ pub trait JobStore: Send + Sync + 'static {
     fn sweep(&self, live: Live) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>>;
     /// Takes up callbacks that are due.
     fn take_up_callbacks(&self, wanted: TakeUp) -> BoxFuture<'_, Result<Vec<DueCallback>, StoreError>>;
-    /// Writes what came of a try; whether it was still who tried that holds it.
-    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>>;
     /// Forgets jobs whose time is over.
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// Notes what a job took.
     fn note_timing(&self, timing: Timing) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// The latest timings, newest first, at most `limit`.
-    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>>;
 
     /// Whether other processes work with the same jobs.
     fn is_shared(&self) -> bool {

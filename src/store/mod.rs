@@ -5,6 +5,7 @@ mod migrations;
 
 pub mod address;
 pub mod backup;
+mod behind;
 pub mod callbacks;
 mod common;
 pub mod documents;

@@ -137,8 +137,26 @@ pub(super) enum Lock<'a> {
     Process(&'a str),
 }
 
+/// Whose key is locked.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum KeyOf {
+    /// That of a job.
+    Job(JobId),
+    /// That which is computed under a lease.
+    Lease(Lease),
+}
+
 /// A connection of either database.
 pub(super) trait Session: Send {
+    /// Passes over rows that somebody else is about to write, where that can be.
+    const SKIP_LOCKED: &'static str;
+    /// The column of the version whose job it is, where versions share the jobs.
+    const ENGINE: &'static str;
+    /// Waits until nobody else changes who computes that key, until the transaction ends: the key, and the time. Nothing where
+    /// there is none.
+    fn lock_key(&mut self, of: KeyOf) -> BoxFuture<'_, Outcome<Option<(Key, i64)>>>;
+    /// Tells other processes that jobs changed and computations are not wanted, once the transaction is committed.
+    fn tell<'a>(&'a mut self, jobs: &'a [JobId], unwanted: &'a [Lease]) -> BoxFuture<'a, Outcome<()>>;
     /// The time by the clock that this store goes by, ms since 1970, UTC.
     fn now_ms(&mut self) -> BoxFuture<'_, Outcome<i64>>;
     /// Waits until nobody else has the lock, and keeps it until the transaction ends.
@@ -178,6 +196,21 @@ macro_rules! statements {
 }
 
 impl Session for SqliteConnection {
+    const SKIP_LOCKED: &'static str = "";
+    const ENGINE: &'static str = "";
+    fn lock_key(&mut self, of: KeyOf) -> BoxFuture<'_, Outcome<Option<(Key, i64)>>> {
+        let key = match of {
+            KeyOf::Job(id) => sql("SELECT key FROM jobs WHERE id = $1").bind(id),
+            KeyOf::Lease(lease) => sql("SELECT key FROM jobs WHERE lease = $1 LIMIT 1").bind(lease),
+        };
+        Box::pin(async move {
+            let key = self.first::<(Vec<u8>,)>(key).await?;
+            Ok(key.and_then(|(key,)| Some((Key::from_bytes(&key)?, super::now_ms()))))
+        })
+    }
+    fn tell<'a>(&'a mut self, _: &'a [JobId], _: &'a [Lease]) -> BoxFuture<'a, Outcome<()>> {
+        Box::pin(async { Ok(()) })
+    }
     fn now_ms(&mut self) -> BoxFuture<'_, Outcome<i64>> {
         Box::pin(async { Ok(super::now_ms()) })
     }
@@ -192,6 +225,27 @@ impl Session for SqliteConnection {
 }
 
 impl Session for PgConnection {
+    const SKIP_LOCKED: &'static str = " FOR UPDATE SKIP LOCKED";
+    const ENGINE: &'static str = ", engine";
+    fn lock_key(&mut self, of: KeyOf) -> BoxFuture<'_, Outcome<Option<(Key, i64)>>> {
+        let key = match of {
+            KeyOf::Job(id) => sql("SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE id = $1) AS job,
+                 LATERAL pg_advisory_xact_lock(lock_of(key))")
+            .bind(id),
+            KeyOf::Lease(lease) => {
+                sql("SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE lease = $1 LIMIT 1) AS job,
+                 LATERAL pg_advisory_xact_lock(lock_of(key))")
+                .bind(lease)
+            }
+        };
+        Box::pin(async move {
+            let locked = self.first::<(Vec<u8>, i64)>(key).await?;
+            Ok(locked.and_then(|(key, now)| Some((Key::from_bytes(&key)?, now))))
+        })
+    }
+    fn tell<'a>(&'a mut self, jobs: &'a [JobId], unwanted: &'a [Lease]) -> BoxFuture<'a, Outcome<()>> {
+        Box::pin(super::postgres::tell(self, jobs, unwanted))
+    }
     fn now_ms(&mut self) -> BoxFuture<'_, Outcome<i64>> {
         Box::pin(async move { Ok(self.one::<(i64,)>(sql("SELECT now_ms()")).await?.0) })
     }
@@ -231,4 +285,8 @@ pub(super) trait Writes: Reads {
         &self,
         work: impl for<'c> Fn(&'c mut ConnectionOf<Self::Database>) -> BoxFuture<'c, Outcome<T>> + Send + Sync + 'static,
     ) -> BoxFuture<'_, Result<T, StoreError>>;
+    /// How long finished jobs are kept, ms.
+    fn keep_ms(&self) -> i64;
+    /// Carries one statement out, which is a transaction of its own.
+    fn run(&self, statement: Statement) -> BoxFuture<'_, Result<u64, StoreError>>;
 }

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::fs::{self, File, TryLockError};
 use std::path::Path;
+use std::sync::atomic::AtomicI64;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Duration;
 
-use bytes::Bytes;
 use futures_util::future::BoxFuture;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{
@@ -15,12 +15,13 @@ use sqlx::sqlite::{
 use sqlx::{Connection, Sqlite};
 
 use super::OpenError;
-use super::common::results;
+use super::StoreError;
+use super::behind::Writer;
+use super::common::results::WritesBehind;
 use super::ledger::Ledger;
-use super::sql::{Outcome, Reads, Writes};
+use super::sql::{Outcome, Reads, Session as _, Statement, Writes};
 use super::sqlite_jobs;
-use super::writer::{LIST_PATIENCE, Limits, Writer};
-use super::{KeptResult, Origin, ResultPage, ResultQuery, ResultStore, StoreError};
+use super::writer::{Limits, SqliteClerk};
 use crate::key::Key;
 
 #[derive(rust_embed::RustEmbed)]
@@ -55,6 +56,8 @@ pub struct SqliteStore {
     #[cfg(test)]
     pub(super) writing: SqlitePool,
     pub(super) keys: Keys,
+    /// Size of the results that are written.
+    pub(super) result_bytes: Arc<AtomicI64>,
     pub(super) keep_ms: i64,
     _lock: File,
 }
@@ -124,7 +127,9 @@ impl SqliteStore {
         }
         let limits = Limits { bytes: i64::try_from(keep.bytes).unwrap_or(i64::MAX), age: keep.age };
         let ledger = Ledger::start(writing.clone());
-        let writer = Writer::start(writing.clone(), keys.clone(), limits).await.map_err(failed)?;
+        let result_bytes = Arc::default();
+        let clerk = SqliteClerk::new(writing.clone(), keys.clone(), limits, Arc::clone(&result_bytes)).await;
+        let writer = Writer::start(clerk.map_err(failed)?);
         let keep_ms = i64::try_from(keep.jobs.as_millis()).unwrap_or(i64::MAX);
         Ok(Self {
             readers,
@@ -133,80 +138,21 @@ impl SqliteStore {
             #[cfg(test)]
             writing,
             keys,
+            result_bytes,
             keep_ms,
             _lock: lock,
         })
     }
-
-    async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
-        if let Some(waiting) = self.writer.waiting(&key) {
-            return Ok(Some(KeptResult::clone(&waiting)));
-        }
-        if !self.keys.may_have(&key) {
-            return Ok(None);
-        }
-        let mut reader = self.readers.acquire().await?;
-        let row = results::row(&mut *reader, key).await.inspect_err(|error| {
-            tracing::warn!(%key, %error, "a kept result cannot be read");
-            metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
-        })?;
-        let Some(row) = row else { return Ok(None) };
-        let result = row.result();
-        if result.is_some() {
-            self.writer.touch(key);
-        } else {
-            tracing::warn!(%key, "a kept result is damaged; it will be computed again");
-            metrics::counter!("precut_store_failures_total", "operation" => "checksum").increment(1);
-            self.writer.forget(key);
-        }
-        Ok(result)
-    }
 }
 
-impl ResultStore for SqliteStore {
-    fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
-        Box::pin(self.read(key))
+impl WritesBehind for SqliteStore {
+    fn writer(&self) -> &Writer {
+        &self.writer
     }
-    fn put(&self, result: KeptResult) {
-        self.writer.put(result);
+    fn may_have(&self, key: &Key) -> bool {
+        self.keys.may_have(key)
     }
-    fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
-        Box::pin(async move {
-            self.writer.flush(LIST_PATIENCE).await;
-            Ok(results::page(&mut *self.reader().await?, query).await?)
-        })
-    }
-    fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
-        Box::pin(async move {
-            self.writer.flush(LIST_PATIENCE).await;
-            Ok(results::uses(&mut *self.reader().await?, record, owner).await?)
-        })
-    }
-    fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.write(move |connection| {
-            let owner = owner.clone();
-            Box::pin(async move { results::note_asked(connection, key, &owner).await })
-        })
-    }
-    fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(async move { Ok(results::has_asked(&mut *self.reader().await?, key, &owner).await?) })
-    }
-    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
-        Box::pin(async move {
-            self.writer.flush(LIST_PATIENCE).await;
-            Ok(results::origin(&mut *self.reader().await?, key, owner).await?)
-        })
-    }
-    fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
-        Box::pin(async move { Ok(results::inputs(&mut *self.reader().await?, &keys, most).await?) })
-    }
-    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(async {
-            sqlx::query("SELECT 1").execute(&self.readers).await?;
-            Ok(())
-        })
-    }
-    fn close(&self) -> BoxFuture<'_, ()> {
+    fn shut(&self) -> BoxFuture<'_, ()> {
         Box::pin(async {
             // What was ordered is written.
             let _ = self.ledger.write(|_| Box::pin(async { Ok(()) })).await;
@@ -230,6 +176,12 @@ impl Writes for SqliteStore {
         work: impl for<'c> Fn(&'c mut SqliteConnection) -> BoxFuture<'c, Outcome<T>> + Send + Sync + 'static,
     ) -> BoxFuture<'_, Result<T, StoreError>> {
         Box::pin(self.ledger.write(work))
+    }
+    fn keep_ms(&self) -> i64 {
+        self.keep_ms
+    }
+    fn run(&self, statement: Statement) -> BoxFuture<'_, Result<u64, StoreError>> {
+        self.write(move |connection| connection.run(statement.clone()))
     }
 }
 

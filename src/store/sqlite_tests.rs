@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use super::*;
-use crate::store::Cursor;
+use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, ResultStore as _};
 use tempfile::TempDir;
 
 const AGE: Duration = Duration::from_hours(1);

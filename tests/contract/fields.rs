@@ -81,7 +81,10 @@ fn printed_defaults_are_the_real_ones() {
     for entry in Registry::standard().unwrap().entries() {
         let id = entry.meta().id;
         let body = precut::engine::Body::Json(entry.meta().examples[0].job.into());
-        let filled = precut::engine::check_now(&Registry::standard().unwrap(), id, body).unwrap().input;
+        let filled =
+            precut::engine::check_now(&Registry::standard().unwrap(), id, body, &precut::engine::Given::default())
+                .unwrap()
+                .input;
         let example: Value = serde_json::from_str(entry.meta().examples[0].job).unwrap();
         let document = entry.input_document();
         compare_defaults(&document, &document, &filled, Some(&example), id);

@@ -1,6 +1,6 @@
 //! Jobs at the ends of every range: each is answered with finite numbers or refused with a reason, never our own fault.
 
-use precut::engine::{Body, Error, solve_now};
+use precut::engine::{Body, Error, Given, solve_now};
 use precut::registry::Registry;
 use precut_calc::calculator::{Failure, Unwatched};
 use proptest::prelude::*;
@@ -150,7 +150,7 @@ proptest! {
             static REGISTRY: Registry = Registry::standard().unwrap();
         }
         let solved = REGISTRY.with(|registry| {
-            solve_now(registry, "deflection-compensation", Body::Json(job.to_string().into()), &Unwatched)
+            solve_now(registry, "deflection-compensation", Body::Json(job.to_string().into()), &Given::default(), &Unwatched)
         });
         match solved {
             Ok(stored) => {

@@ -4,13 +4,13 @@
 mod feed_support;
 
 use feed_support::{reference, renamed, translate};
-use precut::engine::{Body, Error, check_now};
+use precut::engine::{Body, Error, Given, check_now};
 use precut::registry::Registry;
 use serde_json::{Value, json};
 
 /// Code and pointer of every fault, each with a text.
 fn faults(registry: &Registry, job: &Value) -> Vec<(String, String)> {
-    match check_now(registry, "feed-schedule", Body::Json(job.to_string().into())) {
+    match check_now(registry, "feed-schedule", Body::Json(job.to_string().into()), &Given::default()) {
         Err(Error::Invalid { findings, .. }) => findings.into_iter().map(|f| (f.code.to_owned(), f.pointer)).collect(),
         Err(error) => panic!("{error:?}"),
         Ok(_) => panic!("accepted: {job}"),
@@ -43,7 +43,7 @@ fn every_impossible_job_is_refused_at_its_field() {
     let mut base = translate(&reference(file["base"].as_str().unwrap())["input"]);
     base["limits"]["feed_step_ratio_max"] = json!(1.2);
     base["limits"]["deflection_residual_fraction"] = json!(1.0);
-    assert!(check_now(&registry, "feed-schedule", Body::Json(base.to_string().into())).is_ok());
+    assert!(check_now(&registry, "feed-schedule", Body::Json(base.to_string().into()), &Given::default()).is_ok());
     for case in file["cases"].as_array().unwrap() {
         let (name, at) = (case["name"].as_str().unwrap(), pointer(case["field"].as_str().unwrap()));
         let found = faults(&registry, &patched(&base, &case["patch"]));

@@ -5,7 +5,7 @@ mod support;
 
 use std::collections::BTreeSet;
 
-use precut::engine::{Body, Error, check_now};
+use precut::engine::{Body, Error, Given, check_now};
 use precut::registry::Registry;
 use precut::text::{Language, Texts};
 use precut_calc::calculator::{Finding, Value as Said};
@@ -22,7 +22,7 @@ fn faults_of(registry: &Registry, calculator: &str, job: &Value) -> Vec<(String,
 }
 
 fn findings_of(registry: &Registry, calculator: &str, job: &Value) -> Vec<Finding> {
-    match check_now(registry, calculator, Body::Json(job.to_string().into())) {
+    match check_now(registry, calculator, Body::Json(job.to_string().into()), &Given::default()) {
         Err(Error::Invalid { findings, .. }) => findings,
         Err(error) => panic!("{error:?}"),
         Ok(_) => panic!("accepted: {job}"),
@@ -265,7 +265,7 @@ fn every_number_beyond_its_range_is_told_the_whole_range() {
     for entry in registry.entries() {
         let id = entry.meta().id;
         for example in entry.meta().examples {
-            let checked = check_now(&registry, id, Body::Json(example.job.into())).unwrap();
+            let checked = check_now(&registry, id, Body::Json(example.job.into()), &Given::default()).unwrap();
             let mut places = Vec::new();
             numbers(&checked.input, "", &mut places);
             // The same field of another row or example is the same field.
@@ -273,7 +273,8 @@ fn every_number_beyond_its_range_is_told_the_whole_range() {
             for (place, value) in places.iter().flat_map(|place| [(place, -1e30), (place, 1e30)]) {
                 let mut job = checked.input.clone();
                 *job.pointer_mut(place).unwrap() = json!(value);
-                let Err(Error::Invalid { findings, .. }) = check_now(&registry, id, Body::Json(job.to_string().into()))
+                let Err(Error::Invalid { findings, .. }) =
+                    check_now(&registry, id, Body::Json(job.to_string().into()), &Given::default())
                 else {
                     panic!("{id} takes {place} = {value}");
                 };
@@ -390,7 +391,9 @@ fn classes_come_as_a_table_too_and_one_that_is_none_is_its_only_fault() {
         json!({ "csv": format!("run;depth [um];regime\n{}", lines.join("\n")) })
     };
     let of = |job: &Value| faults_of(&registry, "diagnosis", job);
-    let key = |job: &Value| check_now(&registry, "diagnosis", Body::Json(job.to_string().into())).unwrap().key;
+    let key = |job: &Value| {
+        check_now(&registry, "diagnosis", Body::Json(job.to_string().into()), &Given::default()).unwrap().key
+    };
     let of_rows = key(&job);
     job["measurements"] = table(&rows);
     assert_eq!(key(&job), of_rows);

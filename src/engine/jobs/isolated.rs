@@ -13,18 +13,14 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use futures_util::future::BoxFuture;
 use std::sync::Arc;
-use tokio::sync::oneshot;
 
 use super::running::Running;
-use super::work::{Work, answer};
 use super::{MOST_ATTEMPTS, fault, work};
-use crate::engine::exec::{Slot, guarded};
+use crate::engine::exec::{Left, Slot, guarded};
 use crate::engine::read::Ready;
 use crate::engine::{Engine, Error, Inner, Stored, compute, outcome};
 use crate::registry::Registry;
-use crate::store::jobs::Ending;
 
 /// What comes before the answer in the output of the process; whatever else a program prints stands before it.
 const ANSWER: &[u8] = b"\x01precut answer\n";
@@ -53,30 +49,24 @@ pub(super) struct Isolated {
     pub(super) isolation: Isolation,
 }
 
-impl Work for Isolated {
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
+impl Isolated {
+    pub(super) async fn run(
+        self,
+        engine: &Arc<Inner>,
+        running: &Arc<Running>,
         slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>> {
-        Box::pin(async move {
-            let Self { ready, isolation } = *self;
-            if let Some(kept) = engine.look_up(&ready.key).await {
-                return outcome(kept).map(|stored| answer(&stored));
-            }
-            let (sender, receiver) = oneshot::channel();
-            let this = Arc::clone(&engine);
-            slot.line().push(move || {
-                let begun = Instant::now();
-                let given_up = || running.is_cancelled() || sender.is_closed();
-                let computed = guarded(|| compute_apart(&ready, &isolation, &given_up));
-                drop(slot);
-                // Nobody listens if the job was given up.
-                let _ = sender.send(this.keep(&ready, computed, begun.elapsed()));
-            });
-            receiver.await.unwrap_or(Err(Error::Crashed)).map(|stored| answer(&stored))
-        })
+    ) -> Result<Arc<Stored>, Error> {
+        let Self { ready, isolation } = self;
+        if let Some(kept) = engine.look_up(&ready.key).await {
+            return outcome(kept);
+        }
+        let (engine, running) = (Arc::clone(engine), Arc::clone(running));
+        let computed = move |left: &Left<'_>| {
+            let begun = Instant::now();
+            let computed = compute_apart(&ready, &isolation, &|| running.is_cancelled() || left());
+            engine.keep(&ready, computed, begun.elapsed())
+        };
+        slot.run(computed).await
     }
 }
 

@@ -31,13 +31,8 @@
 //! finished. A shard that may have ended its processes runs alone, with each of its points in a process of its own; if one of
 //! these ends that, the study fails with the shard.
 //!
-//! # What else may be a job
-//!
-//! A parameter study is a job like any other: its entry ([`study`](crate::engine::study)) is declared as a calculator's
-//! is, and looks after its points itself. Everything here but [`work`] knows a job only as a
-//! [`NewJob`]: kind, calculator, key, input as bytes. A job that is no calculation of an
-//! entry would have an arm in [`JobKind`] and in [`work::of`], which makes a
-//! [`work::Work`] out of the record's input again.
+//! Everything here but [`work`] knows a job only as a [`NewJob`]: calculator, key, input as bytes. [`work::Work::of`]
+//! makes work of that again.
 
 mod estimate;
 mod fault;
@@ -69,7 +64,7 @@ use super::progress::Reported;
 use super::quota::label;
 use super::{Error, Inner, Key, Shelf, Stored};
 use crate::store::jobs::{
-    Accepted, Changed, Idempotency, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
+    Accepted, Changed, Idempotency, JobId, JobPage, JobQuery, JobRecord, JobState, JobStore, MOST_ATTEMPTS,
     NewCallback, NewJob, News, Priority, Timing,
 };
 use estimate::Estimates;
@@ -123,17 +118,15 @@ impl Ask {
     }
 }
 
-/// A job to be accepted, of whatever kind.
+/// A job to be accepted.
 pub(crate) struct Request {
-    /// What it computes.
-    pub(crate) kind: JobKind,
     /// By which calculator.
     pub(crate) calculator: &'static str,
     /// Which version of it.
     pub(crate) version: u32,
     /// Address of its result.
     pub(crate) key: Key,
-    /// All that [`work::of`] needs.
+    /// All that [`work::Work::of`] needs.
     pub(crate) input: Bytes,
     /// Estimated work, ms.
     pub(crate) estimate_ms: f64,
@@ -275,7 +268,6 @@ impl Jobs {
         let useful_for_ms = ask.deadline.map(|after| i64::try_from(after.as_millis()).unwrap_or(i64::MAX));
         let job = NewJob {
             id: JobId::at(self.store.now_ms()),
-            kind: request.kind,
             calculator: request.calculator.to_owned(),
             version: request.version,
             key: request.key,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{Ask, Feed, Job, Request};
 use crate::engine::memory::{Kept, fingerprint_with};
 use crate::engine::{Body, CacheState, Engine, Error, Known, Solved, Stored, Timings, hit};
-use crate::store::jobs::{DueCallback, JobId, JobKind, JobQuery, JobRecord, JobState, Subject, TakeUp, Tried};
+use crate::store::jobs::{DueCallback, JobId, JobQuery, JobRecord, JobState, Subject, TakeUp, Tried};
 
 /// What came of a request.
 #[derive(Debug, Clone)]
@@ -58,7 +58,6 @@ impl Engine {
             _ => None,
         };
         let request = Request {
-            kind: JobKind::Calculation,
             calculator: meta.id,
             version: meta.version,
             key: ready.key,

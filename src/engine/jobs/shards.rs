@@ -6,20 +6,18 @@
 //! is done of them is on record, so that a job whose process has died goes on from there.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use futures_util::future::BoxFuture;
 use precut_calc::calculator::{Message, Monitor};
 use tokio::sync::OnceCell;
 use tokio::task::spawn_blocking;
 
 use super::running::Running;
-use super::work::{Work, prepared};
+use super::work::prepared;
 use super::worker::stubbornly;
 use super::{MOST_ATTEMPTS, fault};
-use crate::engine::exec::{Slot, guarded};
+use crate::engine::exec::{Left, Slot, guarded};
 use crate::engine::progress::Progress;
 use crate::engine::read::Ready;
 use crate::engine::{Error, Inner, Stored, compute, outcome};
@@ -207,23 +205,18 @@ pub(super) struct OneShard {
     pub(super) apart: bool,
 }
 
-impl Work for OneShard {
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
-        slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>> {
-        Box::pin(async move {
-            let Self { shard, entry, apart } = *self;
-            metrics::counter!("precut_jobs_shards_total").increment(1);
-            let plan = engine.jobs.plans.of(&shard.parent);
-            let sharded = plan.get_or_try_init(|| planned(&engine, &entry, shard.parent, &slot)).await?;
-            let (sharded, wanted) = (Arc::clone(sharded), Wanted { running, is_left: Arc::default() });
-            let _left = Leaves(Arc::clone(&wanted.is_left));
-            let computed = move || sharded.compute(shard.number as usize, &wanted, apart).map_err(unfinished);
-            slot.run(computed).await.map(|content| Ending::Shard(content.into()))
-        })
+impl OneShard {
+    pub(super) async fn run(self, engine: &Arc<Inner>, running: &Arc<Running>, slot: Slot) -> Result<Ending, Error> {
+        let Self { shard, entry, apart } = self;
+        metrics::counter!("precut_jobs_shards_total").increment(1);
+        let plan = engine.jobs.plans.of(&shard.parent);
+        let sharded = plan.get_or_try_init(|| planned(engine, &entry, shard.parent, &slot)).await?;
+        let (sharded, running) = (Arc::clone(sharded), Arc::clone(running));
+        let computed = move |left: &Left<'_>| {
+            let wanted = Wanted { running: &running, left };
+            sharded.compute(shard.number as usize, &wanted, apart).map_err(unfinished)
+        };
+        slot.run(computed).await.map(|content| Ending::Shard(content.into()))
     }
 }
 
@@ -246,23 +239,14 @@ fn unfinished(unfinished: Unfinished) -> Error {
 }
 
 /// Whether a shard is wanted: by its job, and by who has begun it here.
-struct Wanted {
-    running: Arc<Running>,
-    is_left: Arc<AtomicBool>,
+struct Wanted<'r> {
+    running: &'r Running,
+    left: &'r Left<'r>,
 }
 
-impl Monitor for Wanted {
+impl Monitor for Wanted<'_> {
     fn cancelled(&self) -> bool {
-        self.running.is_cancelled() || self.is_left.load(Ordering::Relaxed)
+        self.running.is_cancelled() || (self.left)()
     }
     fn progress(&self, _fraction: f64, _stage: Message) {}
-}
-
-/// Says with its end that a shard was left.
-struct Leaves(Arc<AtomicBool>);
-
-impl Drop for Leaves {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
 }

@@ -1,61 +1,64 @@
-//! What a job does when it runs: one arm per [`JobKind`], and shards.
+//! What a job does when it runs.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
-use futures_util::future::BoxFuture;
 use serde_json::Value;
-use tokio::sync::oneshot;
 
 use super::MOST_ATTEMPTS;
 use super::isolated::Isolated;
 use super::running::Running;
 use super::shards::{self, OneShard};
-use crate::engine::exec::{Slot, guarded};
+use crate::engine::exec::Slot;
 use crate::engine::read::Ready;
 use crate::engine::single_flight::Joined;
 use crate::engine::{Error, Inner, Stored, read};
 use crate::key::Key;
 use crate::registry::Entry;
-use crate::store::jobs::{Claim, Ending, JobKind};
+use crate::store::jobs::{Claim, Ending};
 
 /// Something to run for jobs.
-pub(crate) trait Work: Send + Sync {
+pub(super) enum Work {
+    /// One answer of one calculator.
+    Calculation(Ready),
+    /// The same in a process of its own.
+    Isolated(Isolated),
+    /// An answer made of many.
+    Composed(Composed),
+    /// One shard of such an answer.
+    Shard(OneShard),
+}
+
+impl Work {
+    /// The work of a claimed job, read back from its record.
+    pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Self, Error> {
+        let entry = engine.known(&claim.calculator)?;
+        if let Some(shard) = claim.shard {
+            return Ok(Self::Shard(OneShard { shard, entry, apart: claim.attempt >= MOST_ATTEMPTS }));
+        }
+        if entry.is_composed() {
+            return Ok(Self::Composed(Composed { entry, input: claim.input.clone(), key: claim.key }));
+        }
+        let ready = ready(&entry, &claim.input)?;
+        Ok(match &engine.settings.isolation {
+            Some(isolation) if claim.attempt >= MOST_ATTEMPTS => {
+                Self::Isolated(Isolated { ready, isolation: isolation.clone() })
+            }
+            _ => Self::Calculation(ready),
+        })
+    }
+
     /// Runs it. `slot` is the right to a pool of jobs, to be held as long as cores are used. To be given up soon after
     /// [`Running::cancelled`]; its own progress is to be told by [`Running::follow`].
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
-        slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>>;
-}
-
-/// How work ends that came to an answer.
-pub(super) fn answer(stored: &Stored) -> Ending {
-    Ending::Succeeded(stored.kept())
-}
-
-/// The work of a claimed job, read back from its record.
-pub(super) fn of(engine: &Inner, claim: &Claim) -> Result<Box<dyn Work>, Error> {
-    match claim.kind {
-        JobKind::Calculation => {
-            let entry = engine.known(&claim.calculator)?;
-            if let Some(shard) = claim.shard {
-                return Ok(Box::new(OneShard { shard, entry, apart: claim.attempt >= MOST_ATTEMPTS }));
-            }
-            if entry.is_composed() {
-                return Ok(Box::new(Composed { entry, input: claim.input.clone(), key: claim.key }));
-            }
-            let ready = ready(&entry, &claim.input)?;
-            match &engine.settings.isolation {
-                Some(isolation) if claim.attempt >= MOST_ATTEMPTS => {
-                    Ok(Box::new(Isolated { ready, isolation: isolation.clone() }))
-                }
-                _ => Ok(Box::new(Calculation { ready })),
-            }
-        }
+    pub(super) async fn run(self, engine: &Arc<Inner>, running: &Arc<Running>, slot: Slot) -> Result<Ending, Error> {
+        let stored = match self {
+            Self::Calculation(ready) => Inner::calculate(engine, ready, running, slot).await,
+            Self::Isolated(isolated) => isolated.run(engine, running, slot).await,
+            Self::Composed(composed) => composed.run(engine, running, slot).await,
+            Self::Shard(shard) => return shard.run(engine, running, slot).await,
+        };
+        stored.map(|stored| Ending::Succeeded(stored.kept()))
     }
 }
 
@@ -68,56 +71,26 @@ pub(super) fn ready(entry: &Arc<Entry>, input: &[u8]) -> Result<Ready, Error> {
 
 /// The same as work, which it is where the job is large.
 pub(super) async fn prepared(entry: &Arc<Entry>, input: Bytes, slot: &Slot) -> Result<Ready, Error> {
-    let (entry, (sender, receiver)) = (Arc::clone(entry), oneshot::channel());
-    slot.line().push(move || {
-        // Nobody listens if the job was given up.
-        let _ = sender.send(guarded(|| ready(&entry, &input)));
-    });
-    receiver.await.unwrap_or(Err(Error::Crashed))
+    let entry = Arc::clone(entry);
+    slot.line().run(move |_| ready(&entry, &input)).await
 }
 
 /// An answer made of many: in shards, where that is worth it. A short job was let past the others, and its shards would wait
 /// behind them; a job that an earlier version accepted has another key by now, by which nobody would know its shards.
-struct Composed {
+pub(super) struct Composed {
     entry: Arc<Entry>,
     input: Bytes,
     key: Key,
 }
 
-impl Work for Composed {
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
-        slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>> {
-        Box::pin(async move {
-            let ready = prepared(&self.entry, self.input, &slot).await?;
-            let in_shards = !slot.is_short() && ready.key == self.key;
-            let stored = match ready.prepared.sharded().filter(|_| in_shards) {
-                Some(sharded) => shards::gathered(&engine, (ready, sharded), &running, slot).await,
-                None => Inner::calculate(&engine, ready, &running, slot).await,
-            };
-            stored.map(|stored| answer(&stored))
-        })
-    }
-}
-
-/// One answer of one calculator.
-struct Calculation {
-    ready: Ready,
-}
-
-impl Work for Calculation {
-    fn run(
-        self: Box<Self>,
-        engine: Arc<Inner>,
-        running: Arc<Running>,
-        slot: Slot,
-    ) -> BoxFuture<'static, Result<Ending, Error>> {
-        Box::pin(
-            async move { Inner::calculate(&engine, self.ready, &running, slot).await.map(|stored| answer(&stored)) },
-        )
+impl Composed {
+    async fn run(self, engine: &Arc<Inner>, running: &Running, slot: Slot) -> Result<Arc<Stored>, Error> {
+        let ready = prepared(&self.entry, self.input, &slot).await?;
+        let in_shards = !slot.is_short() && ready.key == self.key;
+        match ready.prepared.sharded().filter(|_| in_shards) {
+            Some(sharded) => shards::gathered(engine, (ready, sharded), running, slot).await,
+            None => Inner::calculate(engine, ready, running, slot).await,
+        }
     }
 }
 
@@ -148,8 +121,7 @@ impl Inner {
             if let Some(leader) = leader
                 && let Some((ready, slot)) = mine.take()
             {
-                let (this, queued) = (Arc::clone(engine), Instant::now());
-                slot.line().push(move || this.run(leader, &ready, Some(slot), queued));
+                Self::enqueue(engine, leader, ready, slot, Instant::now());
             }
             let ended = tokio::select! {
                 ended = waiter.ended() => ended,

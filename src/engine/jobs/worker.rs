@@ -11,7 +11,8 @@ use tokio::task::JoinSet;
 use tracing::Instrument;
 
 use super::running::{Begun, Running};
-use super::{Jobs, MOST_ATTEMPTS, fault, work};
+use super::work::Work;
+use super::{Jobs, MOST_ATTEMPTS, fault};
 use crate::engine::exec::Slot;
 use crate::engine::quota::worked;
 use crate::engine::{Error, Inner};
@@ -188,9 +189,9 @@ async fn run_claimed(engine: &Arc<Inner>, claim: &Claim, running: &Arc<Running>,
         tracing::info!(job = %claim.jobs[0], calculator = claim.calculator, attempt = claim.attempt, "a job begins");
     }
     let started = Instant::now();
-    let outcome = match work::of(engine, claim) {
+    let outcome = match Work::of(engine, claim) {
         Ok(work) => {
-            let working = work.run(Arc::clone(engine), Arc::clone(running), slot);
+            let working = work.run(engine, running, slot);
             tokio::select! {
                 outcome = working => outcome,
                 () = jobs.stopped() => Err(Error::ShuttingDown),

@@ -10,11 +10,12 @@ use precut_library::record::Record;
 use precut_library::{Asked, Lookup, built_in, search};
 
 use super::{Finder, Found, FoundModel, Names};
+use crate::engine::alone::entry;
 use crate::engine::budget::Room;
 use crate::engine::library::{File, kind_of, of_json};
 use crate::engine::model;
 use crate::engine::read::{Draft, Ready};
-use crate::engine::{Body, Error, Form, ModelFile, RecordError, Shelf, entry};
+use crate::engine::{Body, Error, Form, ModelFile, RecordError, Shelf};
 use crate::registry::{Entry, Registry, canonical};
 use crate::store::documents::{DocumentShelf, KeptDocument, Kind, Revisions, Title};
 use crate::store::sqlite::SqliteShelf;

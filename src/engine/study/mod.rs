@@ -113,10 +113,9 @@ impl Calculation for Studies {
         let plan = Plan::new(&self.registry, self.most_points, input).map_err(Unprepared::Invalid)?;
         let canonical = canonical(&plan.input)
             .map_err(|error| Unprepared::Failed(Failure::Internal(format!("the filled study: {error}"))))?;
-        let numbers_of = *plan.entry.meta();
-        let (cost, plan) = (plan.cost, Arc::new(plan));
+        let (cost, entry, plan) = (plan.cost, Arc::clone(&plan.entry), Arc::new(plan));
         let study = Study { shards: Arc::new(Shards::new(&plan, &self.host)), plan };
-        Ok(Prepared::new(cost, canonical, Box::new(study)).with_numbers_of(&numbers_of))
+        Ok(Prepared::new(cost, canonical, Some(entry.meta()), Box::new(study)))
     }
 
     fn broken_rules(&self, job: &Value) -> Vec<Finding> {

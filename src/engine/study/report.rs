@@ -283,7 +283,7 @@ mod tests {
     use serde_json::json;
 
     use super::Json;
-    use crate::engine::{Body, solve_now};
+    use crate::engine::{Body, Given, solve_now};
     use crate::registry::toy;
     use crate::text::{Language, reworded};
 
@@ -291,8 +291,13 @@ mod tests {
     fn said(vary: &Json) -> [String; 2] {
         let job = json!({"length_mm": 500, "segments": [{"diameter_mm": 20}]});
         let study = json!({"calculator": "toy-bar", "job": job, "vary": vary, "outputs": ["/rows"]});
-        let stored =
-            solve_now(&toy::registry(), super::super::STUDIES, Body::Json(study.to_string().into()), &Unwatched);
+        let stored = solve_now(
+            &toy::registry(),
+            super::super::STUDIES,
+            Body::Json(study.to_string().into()),
+            &Given::default(),
+            &Unwatched,
+        );
         let answer: Json = serde_json::from_slice(&stored.unwrap().body).unwrap();
         let english = serde_json::to_vec(&answer["explanation"]).unwrap();
         let russian: Json = serde_json::from_slice(&reworded("explanation", &english, Language::Ru).unwrap()).unwrap();

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::{META, STUDIES};
-use crate::engine::{Body, Error, check_now, read, solve_now, studies_of};
+use crate::engine::{Body, Error, Given, check_now, read, solve_now, studies_of};
 use crate::registry::{Registry, toy};
 use crate::text::{Language, Texts};
 
@@ -21,7 +21,7 @@ fn body(study: &Value) -> Body {
 
 /// Code and pointer of every fault; each must have a text that fits its values.
 fn faults(study: &Value) -> Vec<(&'static str, String)> {
-    match check_now(&toy::registry(), STUDIES, body(study)) {
+    match check_now(&toy::registry(), STUDIES, body(study), &Given::default()) {
         Err(Error::Invalid { findings, .. }) => {
             for finding in &findings {
                 let said = Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
@@ -34,7 +34,7 @@ fn faults(study: &Value) -> Vec<(&'static str, String)> {
 }
 
 fn solved(study: &Value) -> Value {
-    let stored = solve_now(&toy::registry(), STUDIES, body(study), &Unwatched)
+    let stored = solve_now(&toy::registry(), STUDIES, body(study), &Given::default(), &Unwatched)
         .unwrap_or_else(|error| panic!("{study}: {error:?}"));
     serde_json::from_slice(&stored.body).unwrap()
 }
@@ -78,7 +78,7 @@ fn every_calculators_own_choice_of_outputs_is_one() {
 fn every_example_runs() {
     let registry = Registry::standard().unwrap();
     for example in super::EXAMPLES {
-        let stored = solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Unwatched)
+        let stored = solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Given::default(), &Unwatched)
             .unwrap_or_else(|e| panic!("{e:?}"));
         let answer: Value = serde_json::from_slice(&stored.body).unwrap();
         assert!(answer["result"]["succeeded"].as_u64().unwrap() > 3, "{}", example.id);
@@ -106,7 +106,7 @@ fn a_grid_has_a_row_for_each_combination_and_each_is_the_ordinary_job() {
     for ((length, stations), row) in values.iter().zip(rows) {
         assert_eq!(row["outputs"], json!([length / 3.0]), "the calculator's own choice: /deflections_um/0");
         let job = json!({"length_mm": length, "segments": [{"diameter_mm": 20}], "stations": stations});
-        let checked = check_now(&toy::registry(), "toy-bar", body(&job)).unwrap();
+        let checked = check_now(&toy::registry(), "toy-bar", body(&job), &Given::default()).unwrap();
         assert_eq!(row["key"], json!(checked.key.to_string()));
     }
     assert_eq!(
@@ -179,7 +179,9 @@ fn a_study_of_a_billion_points_is_refused_with_limit_and_count() {
             range("/work_ms", counts[1]),
             range("/youngs_modulus_n_per_mm2", counts[2]),
         ]));
-        let Err(Error::Invalid { findings, total: 1 }) = check_now(&toy::registry(), STUDIES, body(&study)) else {
+        let Err(Error::Invalid { findings, total: 1 }) =
+            check_now(&toy::registry(), STUDIES, body(&study), &Given::default())
+        else {
             panic!("not one fault")
         };
         let finding = &findings[0];
@@ -192,7 +194,7 @@ fn a_study_of_a_billion_points_is_refused_with_limit_and_count() {
 fn a_large_study_has_the_faults_of_its_rows_and_spares_those_that_a_variable_leads_into() {
     // Blanks make it large: of its lists the heads are kept at first.
     let large = |study: &Value| Body::Json((study.to_string() + &" ".repeat(100_000)).into());
-    let read = |study: &Value| match check_now(&toy::registry(), STUDIES, large(study)) {
+    let read = |study: &Value| match check_now(&toy::registry(), STUDIES, large(study), &Given::default()) {
         Ok(checked) => Ok(checked.key),
         Err(Error::Invalid { findings, total }) => {
             assert_eq!(total, findings.len());
@@ -209,7 +211,7 @@ fn a_large_study_has_the_faults_of_its_rows_and_spares_those_that_a_variable_lea
         study
     };
     let good = with_rows(&[], "/length_mm");
-    assert_eq!(read(&good), Ok(check_now(&toy::registry(), STUDIES, body(&good)).unwrap().key));
+    assert_eq!(read(&good), Ok(check_now(&toy::registry(), STUDIES, body(&good), &Given::default()).unwrap().key));
     for bad in [&[3][..], &[300], &[3, 300, 599]] {
         let study = with_rows(bad, "/length_mm");
         let places: Vec<_> =
@@ -218,7 +220,10 @@ fn a_large_study_has_the_faults_of_its_rows_and_spares_those_that_a_variable_lea
     }
     for row in [3, 300] {
         let filled_in = with_rows(&[row], &format!("/measurements/{row}/deviation_um"));
-        assert_eq!(read(&filled_in), Ok(check_now(&toy::registry(), STUDIES, body(&filled_in)).unwrap().key));
+        assert_eq!(
+            read(&filled_in),
+            Ok(check_now(&toy::registry(), STUDIES, body(&filled_in), &Given::default()).unwrap().key)
+        );
     }
     let mut nobodys = with_rows(&[3], "/length_mm");
     nobodys["calculator"] = json!("nobodys");
@@ -383,7 +388,7 @@ fn the_version_of_the_calculator_is_part_of_the_key() {
     use precut_calc::calculator::Registrar;
     let later = Registry::with(Registrar::calculator::<Later>).unwrap();
     let study = study(json!([{"pointer": "/length_mm", "values": [100]}]));
-    let key = |registry: &Registry| check_now(registry, STUDIES, body(&study)).unwrap().key;
+    let key = |registry: &Registry| check_now(registry, STUDIES, body(&study), &Given::default()).unwrap().key;
     assert_ne!(key(&toy::registry()), key(&later));
     assert_eq!(key(&toy::registry()), key(&toy::registry()));
 }
@@ -394,7 +399,7 @@ fn pictures_are_a_map_over_two_and_curves_over_one() {
         let mut study = study(vary);
         study["combine"] = json!(combine);
         study["outputs"] = json!(["/deflections_um/0", "/rows"]);
-        solve_now(&toy::registry(), STUDIES, body(&study), &Unwatched).unwrap().figures().unwrap()
+        solve_now(&toy::registry(), STUDIES, body(&study), &Given::default(), &Unwatched).unwrap().figures().unwrap()
     };
     let length = json!({"pointer": "/length_mm", "from": 400, "to": 100, "count": 3, "spacing": "log"});
     let diameter = json!({"pointer": "/segments/0/diameter_mm", "values": [20, 150, 10]});
@@ -446,7 +451,8 @@ fn pictures_are_a_map_over_two_and_curves_over_one() {
 fn pictures_of_the_examples_are_labelled_in_the_language_of_the_reader() {
     let registry = Registry::standard().unwrap();
     for example in super::EXAMPLES {
-        let stored = solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Unwatched).unwrap();
+        let stored =
+            solve_now(&registry, STUDIES, Body::Json(example.job.into()), &Given::default(), &Unwatched).unwrap();
         for figure in stored.figures().unwrap() {
             for (code, value) in figure.title.values.iter() {
                 let [english, russian] =
@@ -473,7 +479,8 @@ fn every_label_of_a_picture_has_its_words_in_the_title_or_a_text() {
     let sets: [&[usize]; 7] = [&[0], &[3], &[0, 1], &[0, 3], &[0, 1, 2], &[3, 0, 1], &[0, 3, 1]];
     for set in sets {
         let vary: Vec<Value> = set.iter().map(|&index| vary[index].clone()).collect();
-        let stored = solve_now(&toy::registry(), STUDIES, body(&study(vary.into())), &Unwatched).unwrap();
+        let stored =
+            solve_now(&toy::registry(), STUDIES, body(&study(vary.into())), &Given::default(), &Unwatched).unwrap();
         for figure in stored.figures().unwrap() {
             let title = Texts::shared().message(Language::En, "figure", &figure.title);
             assert!(title.contains("Deflections 1"), "{title}");
@@ -504,7 +511,7 @@ fn tables_have_a_line_for_each_point_and_one_for_each_output() {
         {"pointer": "/length_mm", "values": [100, 10]},
         {"pointer": "/mode", "values": ["plain", "infeasible"]},
     ]));
-    let stored = solve_now(&toy::registry(), STUDIES, body(&study), &Unwatched).unwrap();
+    let stored = solve_now(&toy::registry(), STUDIES, body(&study), &Given::default(), &Unwatched).unwrap();
     let tables = stored.tables().unwrap();
     let answer: Value = serde_json::from_slice(&stored.body).unwrap();
     let key = |row: usize| answer["result"]["rows"][row]["key"].as_str().unwrap().to_owned();
@@ -563,7 +570,7 @@ fn it_tells_how_far_it_is_and_stops_when_nobody_waits() {
     let study = study(json!([{"pointer": "/length_mm", "from": 100, "to": 500, "count": 50}]));
     let run = |most: usize| {
         let monitor = Impatient { looks: 0.into(), most, told: Vec::new().into() };
-        let outcome = solve_now(&toy::registry(), STUDIES, body(&study), &monitor);
+        let outcome = solve_now(&toy::registry(), STUDIES, body(&study), &Given::default(), &monitor);
         (outcome, monitor.told.into_inner().unwrap())
     };
     let (outcome, told) = run(usize::MAX);
@@ -580,7 +587,7 @@ fn the_cost_is_that_of_its_points() {
     let cost = |count: u64| {
         let mut study = study(json!([{"pointer": "/length_mm", "from": 100, "to": 500, "count": count}]));
         study["job"]["work_ms"] = json!(10);
-        check_now(&toy::registry(), STUDIES, body(&study)).unwrap().cost
+        check_now(&toy::registry(), STUDIES, body(&study), &Given::default()).unwrap().cost
     };
     assert!((cost(10).ms - 102.0).abs() < 1e-9, "{:?}", cost(10));
     assert!((cost(10_000).ms - 102_000.0).abs() < 1e-6, "{:?}", cost(10_000));
@@ -646,7 +653,7 @@ proptest! {
     /// Whatever comes is refused with faults that have words, or runs to an answer with a row for each point.
     #[test]
     fn no_study_makes_it_panic(study in any_study()) {
-        match solve_now(&toy::registry(), STUDIES, body(&study), &Unwatched) {
+        match solve_now(&toy::registry(), STUDIES, body(&study), &Given::default(), &Unwatched) {
             Ok(stored) => {
                 let answer: Value = serde_json::from_slice(&stored.body).unwrap();
                 let rows = answer["result"]["rows"].as_array().unwrap().len();

@@ -10,18 +10,16 @@ use super::results::insert;
 use super::shards;
 use crate::key::Key;
 use crate::store::callbacks::Callback;
-use crate::store::jobs::{
-    Claim, JobId, JobKind, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, ShardId, Timing,
-};
+use crate::store::jobs::{JobId, JobPage, JobQuery, JobRecord, JobState, Lease, Priority, Timing};
 use crate::store::row::ResultRow;
-use crate::store::sql::{Outcome, Session, sql};
+use crate::store::sql::{Outcome, Session, Statement, sql};
 use crate::store::sqlite_jobs::pack::PackedEnding;
 
 /// Which columns a [`RecordRow`] is read from. A shard has no record that anybody reads.
 macro_rules! records {
     ($rest:literal) => {
         concat!(
-            "SELECT jobs.id, kind, calculator, key, jobs.state, stage, progress, attempt, jobs.lease, priority, problem,
+            "SELECT jobs.id, calculator, key, jobs.state, stage, progress, attempt, jobs.lease, priority, problem,
                  estimate_ms, created_ms, started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate, ",
             told!(),
             " FROM jobs LEFT JOIN callbacks ON callbacks.job = jobs.id WHERE parent IS NULL",
@@ -32,7 +30,6 @@ macro_rules! records {
 
 struct RecordRow {
     id: String,
-    kind: String,
     calculator: String,
     key: Vec<u8>,
     state: String,
@@ -54,7 +51,7 @@ struct RecordRow {
 }
 
 from_row!(RecordRow {
-    id, kind, calculator, key, state, stage, progress, attempt as i32, lease, priority, problem, estimate_ms, created_ms,
+    id, calculator, key, state, stage, progress, attempt as i32, lease, priority, problem, estimate_ms, created_ms,
     started_ms, finished_ms, deadline_ms, expires_ms, owner, traceparent, tracestate
 });
 
@@ -63,7 +60,6 @@ impl RecordRow {
         Ok(JobRecord {
             callback,
             id: parsed(&self.id)?,
-            kind: JobKind::of_word(&self.kind).ok_or_else(|| unreadable("kind"))?,
             calculator: self.calculator,
             key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
             state: JobState::of_word(&self.state).ok_or_else(|| unreadable("state"))?,
@@ -120,7 +116,7 @@ pub(in crate::store) fn ids(texts: &[String]) -> Outcome<Vec<JobId>> {
 }
 
 /// The jobs whose ids are returned.
-async fn changed<S: Session>(connection: &mut S, statement: crate::store::sql::Statement) -> Outcome<Vec<JobId>> {
+async fn changed<S: Session>(connection: &mut S, statement: Statement) -> Outcome<Vec<JobId>> {
     let rows: Vec<(String,)> = connection.all(statement).await?;
     rows.iter().map(|(id,)| parsed(id)).collect()
 }
@@ -134,7 +130,7 @@ pub(in crate::store) async fn record<S: Session>(connection: &mut S, id: JobId) 
     row.map(read).transpose()
 }
 
-pub(in crate::store) async fn list<S: Session>(connection: &mut S, query: JobQuery) -> Outcome<JobPage> {
+pub(super) async fn list<S: Session>(connection: &mut S, query: JobQuery) -> Outcome<JobPage> {
     let mut statement = sql(records!(""));
     if let Some(state) = query.state {
         statement.push(" AND jobs.state = ").push_bind(state.word());
@@ -162,11 +158,7 @@ pub(in crate::store) async fn list<S: Session>(connection: &mut S, query: JobQue
 }
 
 /// The inputs of some jobs, as far as they are kept and take no more than `most` bytes.
-pub(in crate::store) async fn inputs<S: Session>(
-    connection: &mut S,
-    ids: &[JobId],
-    most: usize,
-) -> Outcome<Vec<(JobId, Bytes)>> {
+pub(super) async fn inputs<S: Session>(connection: &mut S, ids: &[JobId], most: usize) -> Outcome<Vec<(JobId, Bytes)>> {
     if ids.is_empty() {
         return Ok(Vec::new());
     }
@@ -174,66 +166,6 @@ pub(in crate::store) async fn inputs<S: Session>(
     statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND id IN ").push_list(ids.iter().copied());
     let rows: Vec<(String, Vec<u8>)> = connection.all(statement).await?;
     Ok(rows.into_iter().filter_map(|(id, input)| Some((id.parse().ok()?, input.into()))).collect())
-}
-
-/// The input of a job as it is kept. A damaged one is nothing that can be run: who claims it finds that out and says so on
-/// the record.
-pub(in crate::store) fn unpacked(input: &[u8]) -> Bytes {
-    zstd::decode_all(input).unwrap_or_default().into()
-}
-
-/// A job with what it takes to run it.
-pub(in crate::store) struct Runnable {
-    pub(in crate::store) id: String,
-    pub(in crate::store) key: Vec<u8>,
-    pub(in crate::store) state: String,
-    kind: String,
-    pub(in crate::store) calculator: String,
-    pub(in crate::store) attempt: u32,
-    /// None where another one has the same.
-    input: Option<Vec<u8>>,
-    pub(in crate::store) priority: i32,
-    pub(in crate::store) turn: i64,
-    owner: String,
-    created_ms: i64,
-    traceparent: Option<String>,
-    tracestate: Option<String>,
-    parent: Option<Vec<u8>>,
-    shard: Option<i32>,
-}
-
-from_row!(Runnable {
-    id, key, state, kind, calculator, attempt as i32, input, priority, turn, owner, created_ms, traceparent, tracestate,
-    parent, shard
-});
-
-impl Runnable {
-    pub(in crate::store) const fn is_shard(&self) -> bool {
-        self.shard.is_some()
-    }
-
-    fn shard(&self) -> Outcome<Option<ShardId>> {
-        let Some((parent, number)) = self.parent.as_ref().zip(self.shard) else { return Ok(None) };
-        let parent = Key::from_bytes(parent).ok_or_else(|| unreadable("parent"))?;
-        Ok(Some(ShardId { parent, number: count(number) }))
-    }
-
-    pub(in crate::store) fn claim(self, lease: Lease, jobs: Vec<JobId>) -> Outcome<Box<Claim>> {
-        Ok(Box::new(Claim {
-            lease,
-            jobs,
-            key: Key::from_bytes(&self.key).ok_or_else(|| unreadable("key"))?,
-            shard: self.shard()?,
-            kind: JobKind::of_word(&self.kind).ok_or_else(|| unreadable("kind"))?,
-            calculator: self.calculator,
-            input: unpacked(&self.input.unwrap_or_default()),
-            attempt: self.attempt,
-            owner: self.owner,
-            created_ms: self.created_ms,
-            traceparent: self.traceparent,
-            tracestate: self.tracestate,
-        }))
-    }
 }
 
 /// The result of an ending.
@@ -244,8 +176,20 @@ fn result_of(ending: &PackedEnding) -> Option<&ResultRow> {
     }
 }
 
+/// Ends what is computed under a lease.
+macro_rules! end_job {
+    () => {
+        "UPDATE jobs
+         SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
+             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = CASE WHEN parent IS NULL THEN $5 END,
+             key = coalesce($6, key), result_bytes = $7, content = $8
+         WHERE lease = $1 AND state = 'running' RETURNING id, parent, turn"
+    };
+}
+pub(in crate::store) use end_job;
+
 /// Ends what is computed under a lease, and keeps what it came to.
-pub(in crate::store) async fn finish<S: Session>(
+pub(super) async fn end_leased<S: Session>(
     connection: &mut S,
     lease: Lease,
     ending: &PackedEnding,
@@ -256,7 +200,9 @@ pub(in crate::store) async fn finish<S: Session>(
         (PackedEnding::Succeeded(result), Some(_)) => {
             insert(connection, std::slice::from_ref(result), now).await?;
         }
-        (PackedEnding::Shard(_), Some((_, Some(parent), turn))) => shards::go_on(connection, parent, *turn).await?,
+        (PackedEnding::Shard(_), Some((_, Some(parent), turn))) => {
+            shards::go_on(connection, parent.clone(), *turn).await?;
+        }
         _ => {}
     }
     ended.iter().map(|(id, ..)| parsed(id)).collect()
@@ -267,22 +213,27 @@ async fn end<S: Session>(
     connection: &mut S,
     lease: Lease,
     ending: &PackedEnding,
-    (now, keep_ms): (i64, i64),
+    at: (i64, i64),
 ) -> Outcome<Vec<(String, Option<Vec<u8>>, i64)>> {
+    connection.all(ended(sql(end_job!()), lease, ending, at)).await
+}
+
+/// A statement that begins with [`end_job!`], with its values.
+pub(in crate::store) fn ended(
+    statement: Statement,
+    lease: Lease,
+    ending: &PackedEnding,
+    (now, keep_ms): (i64, i64),
+) -> Statement {
     let (state, content, problem) = match ending {
         PackedEnding::Succeeded(_) => (JobState::Succeeded, None, None),
         PackedEnding::Shard(content) => (JobState::Succeeded, Some(content.clone()), None),
         PackedEnding::Failed(problem) => (JobState::Failed, None, Some(problem.as_str())),
     };
     let result = result_of(ending);
-    let ended = sql("UPDATE jobs
-         SET state = $2, problem = $3, progress = CASE WHEN $2 = 'succeeded' THEN 1.0 ELSE progress END, stage = NULL,
-             lease = NULL, heartbeat_ms = NULL, finished_ms = $4, expires_ms = CASE WHEN parent IS NULL THEN $5 END,
-             key = coalesce($6, key), result_bytes = $7, content = $8
-         WHERE lease = $1 AND state = 'running' RETURNING id, parent, turn");
-    let ended = ended.bind(lease).bind(state.word()).bind(problem).bind(now).bind(now.saturating_add(keep_ms));
-    let ended = ended.bind(result.map(|result| result.key.clone())).bind(result.map_or(0, ResultRow::bytes));
-    connection.all(ended.bind(content)).await
+    let statement = statement.bind(lease).bind(state.word()).bind(problem).bind(now).bind(now.saturating_add(keep_ms));
+    let statement = statement.bind(result.map(|result| result.key.clone()));
+    statement.bind(result.map_or(0, ResultRow::bytes)).bind(content)
 }
 
 /// Puts the running jobs of a lease back in line that were last heard of at `heard_ms` or before: `charged` says whether the
@@ -290,7 +241,7 @@ async fn end<S: Session>(
 /// along any more. A shard keeps its turn, its parent's or the one behind all others.
 pub(in crate::store) async fn put_back<S: Session>(
     connection: &mut S,
-    lease: &str,
+    lease: Lease,
     charged: bool,
     heard_ms: i64,
 ) -> Outcome<Vec<JobId>> {
@@ -363,7 +314,7 @@ pub(in crate::store) async fn note_timing<S: Session>(connection: &mut S, timing
     connection.run(noted.bind(now)).await.map(drop)
 }
 
-pub(in crate::store) async fn timings<S: Session>(connection: &mut S, limit: u32) -> Outcome<Vec<Timing>> {
+pub(super) async fn timings<S: Session>(connection: &mut S, limit: u32) -> Outcome<Vec<Timing>> {
     let timings = sql("SELECT calculator, version, predicted_ms, actual_ms FROM timings ORDER BY at_ms DESC LIMIT $1")
         .bind(limit);
     let rows: Vec<(String, i32, f64, f64)> = connection.all(timings).await?;

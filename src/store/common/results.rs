@@ -1,20 +1,120 @@
 //! Kept results: found, listed, and who has asked for them.
 
+use std::time::Duration;
+
 use bytes::Bytes;
+use futures_util::future::BoxFuture;
 
 use super::jobs::count;
 use crate::key::Key;
+use crate::store::behind::Writer;
 use crate::store::row::ResultRow;
-use crate::store::sql::{Outcome, Session, Statement, Value, sql};
-use crate::store::{Cursor, Origin, ResultPage, ResultQuery, ResultSummary};
+use crate::store::sql::{Outcome, Session, Statement, Value, Writes, sql};
+use crate::store::{Cursor, KeptResult, Origin, ResultPage, ResultQuery, ResultStore, ResultSummary, StoreError};
 
-pub(in crate::store) async fn row<S: Session>(connection: &mut S, key: Key) -> Outcome<Option<ResultRow>> {
-    let row =
-        sql("SELECT key, calculator, version, engine, input, body, checksum, records FROM results WHERE key = $1");
-    connection.first(row.bind(key)).await
+/// How long a list waits for what is just being written.
+const LIST_PATIENCE: Duration = Duration::from_secs(1);
+
+/// A store that writes results behind the answers.
+pub(in crate::store) trait WritesBehind: Writes {
+    fn writer(&self) -> &Writer;
+    /// Whether a result may be there; `false` is certain.
+    fn may_have(&self, _key: &Key) -> bool {
+        true
+    }
+    /// Writes what waits and closes.
+    fn shut(&self) -> BoxFuture<'_, ()>;
 }
 
-pub(in crate::store) async fn page<S: Session>(connection: &mut S, query: ResultQuery) -> Outcome<ResultPage> {
+impl<W: WritesBehind> ResultStore for W {
+    fn get(&self, key: Key) -> BoxFuture<'_, Result<Option<KeptResult>, StoreError>> {
+        Box::pin(async move {
+            if let Some(waiting) = self.writer().waiting(&key) {
+                return Ok(Some(KeptResult::clone(&waiting)));
+            }
+            if !self.may_have(&key) {
+                return Ok(None);
+            }
+            let row = sql("SELECT key, calculator, version, engine, input, body, checksum, records FROM results
+                 WHERE key = $1");
+            let row = self.reader().await?.first::<ResultRow>(row.bind(key)).await.inspect_err(|error| {
+                tracing::warn!(%key, %error, "a kept result cannot be read");
+                metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
+            })?;
+            let Some(row) = row else { return Ok(None) };
+            let result = row.result();
+            if result.is_some() {
+                self.writer().touch(key);
+            } else {
+                tracing::warn!(%key, "a kept result is damaged; it will be computed again");
+                metrics::counter!("precut_store_failures_total", "operation" => "checksum").increment(1);
+                self.writer().forget(key);
+            }
+            Ok(result)
+        })
+    }
+    fn put(&self, result: KeptResult) {
+        self.writer().put(result);
+    }
+    fn list(&self, query: ResultQuery) -> BoxFuture<'_, Result<ResultPage, StoreError>> {
+        Box::pin(async move {
+            self.writer().flush(LIST_PATIENCE).await;
+            Ok(page(&mut *self.reader().await?, query).await?)
+        })
+    }
+    fn uses(&self, record: String, owner: Option<String>) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(async move {
+            self.writer().flush(LIST_PATIENCE).await;
+            let mut statement = sql("SELECT count(*) FROM results WHERE true");
+            narrow(&mut statement, owner, Some(record));
+            let (uses,): (i64,) = self.reader().await?.one(statement).await?;
+            Ok(u64::try_from(uses).unwrap_or(0))
+        })
+    }
+    fn note_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<(), StoreError>> {
+        let asked = sql("INSERT INTO asked (key, owner) VALUES ($1, $2) ON CONFLICT DO NOTHING").bind(key).bind(owner);
+        Box::pin(async move { self.run(asked).await.map(drop) })
+    }
+    fn has_asked(&self, key: Key, owner: String) -> BoxFuture<'_, Result<bool, StoreError>> {
+        Box::pin(async move {
+            let asked = sql("SELECT EXISTS (SELECT 1 FROM asked WHERE key = $1 AND owner = $2)
+                 OR EXISTS (SELECT 1 FROM jobs WHERE key = $1 AND owner = $2)");
+            let (asked,): (bool,) = self.reader().await?.one(asked.bind(key).bind(owner)).await?;
+            Ok(asked)
+        })
+    }
+    fn origin(&self, key: Key, owner: Option<String>) -> BoxFuture<'_, Result<Origin, StoreError>> {
+        Box::pin(async move {
+            self.writer().flush(LIST_PATIENCE).await;
+            let mut reader = self.reader().await?;
+            let created = sql("SELECT created_ms FROM results WHERE key = $1").bind(key);
+            let created_ms = reader.first::<(i64,)>(created).await?.map(|row| row.0);
+            let asked_by =
+                sql("SELECT owner FROM asked WHERE key = $1 AND ($3 IS NULL OR owner = $3) ORDER BY owner LIMIT $2");
+            let asked_by: Vec<(String,)> = reader.all(asked_by.bind(key).bind(Origin::MOST).bind(owner)).await?;
+            Ok(Origin { created_ms, asked_by: asked_by.into_iter().map(|(owner,)| owner).collect() })
+        })
+    }
+    fn inputs(&self, keys: Vec<Key>, most: usize) -> BoxFuture<'_, Result<Vec<(Key, Bytes)>, StoreError>> {
+        Box::pin(async move {
+            if keys.is_empty() {
+                return Ok(Vec::new());
+            }
+            let mut statement = sql("SELECT key, input FROM results WHERE octet_length(input) <= ");
+            statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND key IN ").push_list(keys);
+            let rows: Vec<(Vec<u8>, Vec<u8>)> = self.reader().await?.all(statement).await?;
+            Ok(rows.into_iter().filter_map(|(key, input)| Some((Key::from_bytes(&key)?, input.into()))).collect())
+        })
+    }
+    fn ping(&self) -> BoxFuture<'_, Result<(), StoreError>> {
+        Box::pin(async move { Ok(self.reader().await?.run(sql("SELECT 1")).await.map(drop)?) })
+    }
+    fn close(&self) -> BoxFuture<'_, ()> {
+        self.shut()
+    }
+}
+
+async fn page<S: Session>(connection: &mut S, query: ResultQuery) -> Outcome<ResultPage> {
     let limit = query.limit.unwrap_or(ResultQuery::LIMIT).clamp(1, ResultQuery::MOST);
     let mut statement = sql("SELECT key, calculator, version, engine, bytes, created_ms FROM results WHERE true");
     if let Some(calculator) = query.calculator {
@@ -35,17 +135,6 @@ pub(in crate::store) async fn page<S: Session>(connection: &mut S, query: Result
     Ok(ResultPage { items, next })
 }
 
-pub(in crate::store) async fn uses<S: Session>(
-    connection: &mut S,
-    record: String,
-    owner: Option<String>,
-) -> Outcome<u64> {
-    let mut statement = sql("SELECT count(*) FROM results WHERE true");
-    narrow(&mut statement, owner, Some(record));
-    let (uses,): (i64,) = connection.one(statement).await?;
-    Ok(u64::try_from(uses).unwrap_or(0))
-}
-
 /// Only results that an owner has asked for, and whose jobs got a record.
 fn narrow(statement: &mut Statement, owner: Option<String>, record: Option<String>) {
     if let Some(owner) = owner {
@@ -59,45 +148,6 @@ fn narrow(statement: &mut Statement, owner: Option<String>, record: Option<Strin
         statement.push(" AND records <> '' AND replace(records, ").push_bind(ResultQuery::mark(&record));
         statement.push(", '') <> records");
     }
-}
-
-pub(in crate::store) async fn note_asked<S: Session>(connection: &mut S, key: Key, owner: &str) -> Outcome<()> {
-    let asked = sql("INSERT INTO asked (key, owner) VALUES ($1, $2) ON CONFLICT DO NOTHING").bind(key).bind(owner);
-    connection.run(asked).await.map(drop)
-}
-
-pub(in crate::store) async fn has_asked<S: Session>(connection: &mut S, key: Key, owner: &str) -> Outcome<bool> {
-    let asked = sql("SELECT EXISTS (SELECT 1 FROM asked WHERE key = $1 AND owner = $2)
-             OR EXISTS (SELECT 1 FROM jobs WHERE key = $1 AND owner = $2)");
-    let (asked,): (bool,) = connection.one(asked.bind(key).bind(owner)).await?;
-    Ok(asked)
-}
-
-pub(in crate::store) async fn origin<S: Session>(
-    connection: &mut S,
-    key: Key,
-    owner: Option<String>,
-) -> Outcome<Origin> {
-    let created = sql("SELECT created_ms FROM results WHERE key = $1").bind(key);
-    let created_ms = connection.first::<(i64,)>(created).await?.map(|row| row.0);
-    let asked_by = sql("SELECT owner FROM asked WHERE key = $1 AND ($3 IS NULL OR owner = $3) ORDER BY owner LIMIT $2");
-    let asked_by: Vec<(String,)> = connection.all(asked_by.bind(key).bind(Origin::MOST).bind(owner)).await?;
-    Ok(Origin { created_ms, asked_by: asked_by.into_iter().map(|(owner,)| owner).collect() })
-}
-
-/// The inputs of some results, compressed, as far as they take no more than `most` bytes.
-pub(in crate::store) async fn inputs<S: Session>(
-    connection: &mut S,
-    keys: &[Key],
-    most: usize,
-) -> Outcome<Vec<(Key, Bytes)>> {
-    if keys.is_empty() {
-        return Ok(Vec::new());
-    }
-    let mut statement = sql("SELECT key, input FROM results WHERE octet_length(input) <= ");
-    statement.push_bind(i64::try_from(most).unwrap_or(i64::MAX)).push(" AND key IN ").push_list(keys.iter().copied());
-    let rows: Vec<(Vec<u8>, Vec<u8>)> = connection.all(statement).await?;
-    Ok(rows.into_iter().filter_map(|(key, input)| Some((Key::from_bytes(&key)?, input.into()))).collect())
 }
 
 struct SummaryRow {

@@ -5,47 +5,41 @@
 
 use bytes::Bytes;
 
-use super::jobs::{count, unpacked};
+use super::jobs::count;
+use super::runnable::unpacked;
 use crate::key::Key;
 use crate::store::jobs::{Lease, MOST_ATTEMPTS, Shard, ShardId};
 use crate::store::sql::{Outcome, Session, Value, sql};
 
 /// The turn of shards that go behind all other jobs of their priority.
-const BEHIND: i64 = i64::MAX / 4;
+pub(in crate::store) const BEHIND: i64 = i64::MAX / 4;
 
-/// Puts shards of what runs under a lease in line; `engine` is a column that only one of the stores has. Whether the lease
-/// holds.
-pub(in crate::store) async fn add<S: Session>(
-    connection: &mut S,
-    lease: Lease,
-    numbers: &[u32],
-    engine: &'static str,
-) -> Outcome<bool> {
+/// Puts shards of what runs under a lease in line. Whether the lease holds.
+pub(super) async fn add<S: Session>(connection: &mut S, lease: Lease, numbers: &[u32]) -> Outcome<bool> {
     let parent = sql("SELECT key FROM jobs WHERE lease = $1 AND state = 'running' LIMIT 1").bind(lease);
     let parent = connection.first::<(Vec<u8>,)>(parent).await?;
     let Some(parent) = parent.and_then(|(key,)| Key::from_bytes(&key)) else { return Ok(false) };
     if !numbers.is_empty() {
-        insert(connection, (lease, parent), numbers, engine).await?;
+        insert(connection, (lease, parent), numbers).await?;
     }
-    let nobody_has_it = "NOT EXISTS (SELECT 1 FROM jobs AS other
-         WHERE other.parent = $1 AND other.state IN ('queued', 'running') AND other.turn < $2)";
-    give_turn(connection, parent, nobody_has_it).await?;
+    // Unless one of them has it.
+    let given = sql(concat!(
+        give_turn!("$1", "$2"),
+        " AND NOT EXISTS (SELECT 1 FROM jobs AS other
+              WHERE other.parent = $1 AND other.state IN ('queued', 'running') AND other.turn < $2)"
+    ));
+    connection.run(given.bind(parent).bind(BEHIND)).await?;
     Ok(true)
 }
 
-async fn insert<S: Session>(
-    connection: &mut S,
-    (lease, parent): (Lease, Key),
-    numbers: &[u32],
-    engine: &'static str,
-) -> Outcome<()> {
+async fn insert<S: Session>(connection: &mut S, (lease, parent): (Lease, Key), numbers: &[u32]) -> Outcome<()> {
     let now = connection.now_ms().await?;
     let mut added =
         sql("INSERT INTO jobs (id, key, shard, kind, calculator, version, priority, parent, input, state, turn,
              owner, estimate_ms, created_ms");
-    added.push(engine).push(") SELECT column1, column2, column3, kind, calculator, version, priority, key, ");
+    added.push(S::ENGINE).push(") SELECT column1, column2, column3, kind, calculator, version, priority, key, ");
     added.push_bind(Vec::<u8>::new()).push(", 'queued', ").push_bind(BEHIND).push(", '', 0.0, ").push_bind(now);
-    added.push(engine).push(" FROM (SELECT * FROM jobs WHERE lease = ").push_bind(lease);
+    added.push(S::ENGINE).push(" FROM (SELECT * FROM jobs WHERE lease = ").push_bind(lease);
     added.push(" AND state = 'running' ORDER BY id LIMIT 1) AS whole, (VALUES ");
     for (index, &number) in numbers.iter().enumerate() {
         let shard = ShardId { parent, number };
@@ -61,24 +55,51 @@ async fn insert<S: Session>(
     connection.run(added).await.map(drop)
 }
 
-/// Gives the parent's turn to the first shard that waits, where that is wanted.
-async fn give_turn<S: Session>(connection: &mut S, parent: Key, wanted: &'static str) -> Outcome<()> {
-    let mut given = sql("UPDATE jobs
-         SET turn = coalesce((SELECT min(turn) FROM jobs AS whole WHERE whole.key = $1 AND whole.state = 'running'), turn)
-         WHERE id = (SELECT id FROM jobs WHERE parent = $1 AND state = 'queued' ORDER BY id LIMIT 1)
-             AND state = 'queued' AND turn >= $2 AND ");
-    given.push(wanted);
-    connection.run(given.bind(parent).bind(BEHIND)).await.map(drop)
+/// Gives the parent's turn to the first shard that waits.
+macro_rules! give_turn {
+    ($parent:literal, $behind:literal) => {
+        concat!(
+            "UPDATE jobs
+             SET turn = coalesce(
+                 (SELECT min(turn) FROM jobs AS whole WHERE whole.key = ",
+            $parent,
+            " AND whole.state = 'running'), turn)
+             WHERE id = (SELECT id FROM jobs WHERE parent = ",
+            $parent,
+            " AND state = 'queued' ORDER BY id LIMIT 1)
+                 AND state = 'queued' AND turn >= ",
+            $behind
+        )
+    };
 }
+pub(in crate::store) use give_turn;
+
+/// A parent of which a shard ends gets on: it is not to blame for the end of its processes. What is done is not computed
+/// again, so that this cannot go on for ever.
+macro_rules! get_on {
+    ($parent:literal, $most:literal) => {
+        concat!(
+            "UPDATE jobs SET attempt = ",
+            $most,
+            " WHERE key = ",
+            $parent,
+            " AND state = 'running' AND attempt > ",
+            $most
+        )
+    };
+}
+pub(in crate::store) use get_on;
+
+/// The most starts with which a parent is left that gets on.
+pub(in crate::store) const MOST_OF_PARENT: u32 = MOST_ATTEMPTS - 1;
 
 /// A shard of that turn has ended: if it was the parent's, the next has it.
-pub(super) async fn go_on<S: Session>(connection: &mut S, parent: &[u8], turn: i64) -> Outcome<()> {
-    let Some(parent) = Key::from_bytes(parent) else { return Ok(()) };
-    // Whoever gets on is not to blame for the end of its processes: what is done is not computed again, so that this cannot
-    // go on for ever.
-    let gets_on = sql("UPDATE jobs SET attempt = $2 WHERE key = $1 AND state = 'running' AND attempt > $2");
-    connection.run(gets_on.bind(parent).bind(MOST_ATTEMPTS - 1)).await?;
-    if turn < BEHIND { give_turn(connection, parent, "true").await } else { Ok(()) }
+pub(super) async fn go_on<S: Session>(connection: &mut S, parent: Vec<u8>, turn: i64) -> Outcome<()> {
+    connection.run(sql(get_on!("$1", "$2")).bind(parent.clone()).bind(MOST_OF_PARENT)).await?;
+    if turn < BEHIND {
+        connection.run(sql(give_turn!("$1", "$2")).bind(parent).bind(BEHIND)).await?;
+    }
+    Ok(())
 }
 
 /// Of these shards those that are over.

@@ -2,11 +2,11 @@
 
 use sqlx::postgres::{PgConnection, PgPool};
 
-use super::run::requeue;
 use super::{PostgresStore, lock, news, texts};
 use crate::key::Key;
 use crate::store::StoreError;
 use crate::store::common::jobs::{ids, parsed, unwanted};
+use crate::store::common::run::requeue;
 use crate::store::common::shards::forget_orphans;
 use crate::store::common::usage::forget_work;
 use crate::store::jobs::{Changed, JobId, Lease, Live};

@@ -9,7 +9,6 @@ mod callbacks;
 mod care;
 mod clock;
 mod jobs;
-mod line;
 mod news;
 mod results;
 mod run;
@@ -19,21 +18,25 @@ mod tests;
 mod tls;
 mod writer;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::future::BoxFuture;
 use sqlx::postgres::{PgConnection, PgPool, Postgres};
 
 use super::address::Secret;
+use super::behind::Writer;
+use super::common::results::WritesBehind;
 use super::jobs::{Lease, SILENCE};
-use super::sql::{Outcome, Reads, Writes};
+use super::sql::{Outcome, Reads, Session as _, Statement, Writes};
 use super::sqlite::Keep;
 use super::{OpenError, StoreError};
 use crate::key::Key;
 use clock::Clock;
 use news::Newsroom;
+pub(super) use news::tell;
 use run::Taker;
-use writer::Writer;
+use writer::PostgresClerk;
 
 /// How long to wait for what.
 #[derive(Debug, Clone, Copy)]
@@ -82,7 +85,7 @@ pub(crate) struct PostgresStore {
     pool: PgPool,
     writer: Writer,
     newsroom: Newsroom,
-    clock: Clock,
+    clock: Arc<Clock>,
     /// What this process is called among those that run jobs.
     worker: Lease,
     keep_ms: i64,
@@ -96,11 +99,16 @@ impl PostgresStore {
     /// Connects, brings the tables up to date and looks after what this process takes on.
     pub(crate) async fn open(address: &Secret, usage: Use) -> Result<Self, OpenError> {
         let pool = start::connected(address, &usage).await?;
-        let clock = Clock::new();
+        let clock = Arc::new(Clock::new());
         clock.read(&pool).await.map_err(|error| start::refused(&error))?;
         let keep_ms = i64::try_from(usage.keep.jobs.as_millis()).unwrap_or(i64::MAX / 4);
         Ok(Self {
-            writer: Writer::start(pool.clone(), usage.keep),
+            writer: Writer::start(PostgresClerk {
+                pool: pool.clone(),
+                clock: Arc::clone(&clock),
+                keep: usage.keep,
+                unlooked_bytes: 0,
+            }),
             newsroom: Newsroom::open(pool.clone()),
             worker: Lease::new(),
             clock,
@@ -144,16 +152,30 @@ impl Writes for PostgresStore {
     ) -> BoxFuture<'_, Result<T, StoreError>> {
         Box::pin(self.write(move |connection| work(connection)))
     }
+    fn keep_ms(&self) -> i64 {
+        self.keep_ms
+    }
+    fn run(&self, statement: Statement) -> BoxFuture<'_, Result<u64, StoreError>> {
+        Box::pin(async move { Ok(self.reader().await?.run(statement).await?) })
+    }
+}
+
+impl WritesBehind for PostgresStore {
+    fn writer(&self) -> &Writer {
+        &self.writer
+    }
+    fn shut(&self) -> BoxFuture<'_, ()> {
+        Box::pin(async {
+            self.writer.close().await;
+            self.newsroom.close();
+            self.pool.close().await;
+        })
+    }
 }
 
 /// The lock of a key, as the function `lock_of` makes it.
 fn lock_of(key: &Key) -> i64 {
     key.as_bytes().first_chunk().map_or(0, |bytes| i64::from_be_bytes(*bytes))
-}
-
-/// A count or a version into a column.
-fn column(number: u32) -> i32 {
-    i32::try_from(number).unwrap_or(i32::MAX)
 }
 
 /// Leases and ids as they stand in columns.
@@ -168,28 +190,4 @@ async fn lock(connection: &mut PgConnection, key: &Key) -> Outcome<i64> {
         .fetch_one(connection)
         .await?;
     Ok(now)
-}
-
-/// The same for the key of a job; `None` where there is no such job.
-async fn lock_job(connection: &mut PgConnection, job: &str) -> Outcome<Option<(Key, i64)>> {
-    let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
-        "SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE id = $1) AS job,
-             LATERAL pg_advisory_xact_lock(lock_of(key))",
-    )
-    .bind(job)
-    .fetch_optional(connection)
-    .await?;
-    Ok(locked.and_then(|(key, now)| Some((Key::from_bytes(&key)?, now))))
-}
-
-/// The same for the key that is computed under a lease; `None` where nothing is.
-async fn lock_lease(connection: &mut PgConnection, lease: Lease) -> Outcome<Option<(Key, i64)>> {
-    let locked: Option<(Vec<u8>, i64)> = sqlx::query_as(
-        "SELECT key, now_ms() FROM (SELECT key FROM jobs WHERE lease = $1 LIMIT 1) AS job,
-             LATERAL pg_advisory_xact_lock(lock_of(key))",
-    )
-    .bind(lease.to_string())
-    .fetch_optional(connection)
-    .await?;
-    Ok(locked.and_then(|(key, now)| Some((Key::from_bytes(&key)?, now))))
 }

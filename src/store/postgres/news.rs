@@ -33,8 +33,16 @@ struct Notice {
     waiting: bool,
 }
 
+/// A statement's way to say the same of one job.
+macro_rules! told {
+    ($id:literal) => {
+        concat!("pg_notify('precut_news', json_build_object('jobs', json_build_array(", $id, "))::text)")
+    };
+}
+pub(super) use told;
+
 /// Tells all processes, once the transaction is committed.
-pub(super) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
+pub(in crate::store) async fn tell(connection: &mut PgConnection, jobs: &[JobId], unwanted: &[Lease]) -> Outcome<()> {
     let (jobs, unwanted) = (texts(jobs), texts(unwanted));
     let of_jobs = jobs.chunks(TOLD_AT_ONCE).map(|jobs| Notice { jobs: jobs.to_vec(), ..Notice::default() });
     let of_leases =

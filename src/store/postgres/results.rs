@@ -1,14 +1,10 @@
-//! Kept results: read, listed, written, thrown away.
+//! Kept results that are thrown away.
 
 use std::time::Duration;
 
 use sqlx::postgres::PgPool;
 
-use super::PostgresStore;
-use crate::key::Key;
-use crate::store::common::results::row;
-use crate::store::sql::{Outcome, Reads as _};
-use crate::store::{KeptResult, StoreError};
+use crate::store::sql::Outcome;
 
 /// Rows deleted in one transaction.
 const EVICTED_AT_ONCE: i64 = 1000;
@@ -16,29 +12,6 @@ const EVICTED_AT_ONCE: i64 = 1000;
 const EVICT_TO_PERCENT: i64 = 90;
 /// The lock of whoever evicts.
 const EVICTION: (i32, i32) = (0x7072_6563, 3);
-
-impl PostgresStore {
-    pub(super) async fn read(&self, key: Key) -> Result<Option<KeptResult>, StoreError> {
-        if let Some(waiting) = self.writer.waiting(&key) {
-            return Ok(Some(KeptResult::clone(&waiting)));
-        }
-        let mut reader = self.reader().await?;
-        let row = row(&mut *reader, key).await.inspect_err(|error| {
-            tracing::warn!(%key, %error, "a kept result cannot be read");
-            metrics::counter!("precut_store_failures_total", "operation" => "read").increment(1);
-        })?;
-        let Some(row) = row else { return Ok(None) };
-        let result = row.result();
-        if result.is_some() {
-            self.writer.touch(key);
-        } else {
-            tracing::warn!(%key, "a kept result is damaged; it will be computed again");
-            metrics::counter!("precut_store_failures_total", "operation" => "checksum").increment(1);
-            self.writer.forget(key);
-        }
-        Ok(result)
-    }
-}
 
 /// Deletes what has not been used for longer than the age allowed, and what has not been used for longest until the
 /// total is below the limit again; what a kept job points to stays. One process at a time.

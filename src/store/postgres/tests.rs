@@ -12,7 +12,8 @@ use tokio::sync::{OnceCell, mpsc};
 use super::*;
 use crate::store::address::StoreAddress;
 use crate::store::jobs::{
-    Accepted, Beat, Changed, Claimed, Ending, JobId, JobState, JobStore, Lease, NewJob, News, Next, Wanted,
+    Accepted, Beat, Changed, Claimed, Ending, JobId, JobShelf as _, JobState, JobStore, Lease, NewJob, News, Next,
+    Wanted,
 };
 use crate::store::suite::{MOST, PROBLEM, Place, job, keep, key, result, suite};
 use crate::store::{ResultStore, Store};

@@ -3,8 +3,8 @@
 use sqlx::sqlite::{SqliteConnection, SqlitePool};
 
 use super::callbacks;
-use super::run::requeue;
 use crate::store::common::jobs::{self, parsed, unwanted};
+use crate::store::common::run;
 use crate::store::common::shards::forget_orphans;
 use crate::store::jobs::{Changed, JobId, Lease, Timing};
 use crate::store::now_ms;
@@ -55,12 +55,21 @@ pub(super) async fn expire_deadlines(
     Ok((Changed { jobs, unwanted }, next))
 }
 
+/// Puts what is computed under these leases back in line.
+async fn requeue(connection: &mut SqliteConnection, leases: &[String]) -> Outcome<Vec<JobId>> {
+    let mut back = Vec::new();
+    for lease in leases {
+        back.extend(run::requeue(connection, parsed(lease)?, true, None).await?);
+    }
+    Ok(back)
+}
+
 pub(super) async fn sweep(connection: &mut SqliteConnection, live: &[Lease]) -> Outcome<Vec<JobId>> {
     let running = sqlx::query_scalar("SELECT DISTINCT lease FROM jobs WHERE state = 'running'");
     let mut stale: Vec<String> = running.fetch_all(&mut *connection).await?;
     let live: Vec<String> = live.iter().map(Lease::to_string).collect();
     stale.retain(|lease| !live.contains(lease));
-    requeue(connection, &stale, true).await
+    requeue(connection, &stale).await
 }
 
 /// What one round of forgetting did.
@@ -114,7 +123,7 @@ pub(in crate::store) async fn recover(pool: &SqlitePool) -> Outcome<u64> {
     let orphans: Vec<String> = sqlx::query_scalar("SELECT DISTINCT lease FROM jobs WHERE state = 'running'")
         .fetch_all(&mut *transaction)
         .await?;
-    let count = requeue(&mut transaction, &orphans, true).await?.len();
+    let count = requeue(&mut transaction, &orphans).await?.len();
     sqlx::query("UPDATE jobs SET heartbeat_ms = NULL WHERE state = 'queued' AND heartbeat_ms IS NOT NULL")
         .execute(&mut *transaction)
         .await?;

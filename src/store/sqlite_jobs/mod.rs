@@ -2,35 +2,34 @@
 
 mod callbacks;
 mod care;
-mod line;
 pub(super) mod pack;
 mod run;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
-use bytes::Bytes;
 use futures_util::future::BoxFuture;
 
-use super::common::callbacks::settle;
-use super::common::jobs::{self, finish, record, set_back};
-use super::common::shards;
-use super::common::usage::{forget_work, kept_by_owner, note_work, usage};
+use super::common::line::{Terms, submit};
+use super::common::run::finish;
+use super::common::usage::forget_work;
 use super::jobs::{
-    Accepted, Beat, Cancelled, Changed, Claimed, DueCallback, Ending, JobCounts, JobId, JobPage, JobQuery, JobRecord,
-    JobStore, Lease, Live, NewJob, Next, Shard, TakeUp, Timing, Tried, Usage, Wanted,
+    Accepted, Beat, Changed, DueCallback, Ending, JobCounts, JobId, JobStore, Lease, Live, NewJob, Next, TakeUp,
+    Timing, Wanted,
 };
-use super::sql::Reads as _;
 use super::sqlite::SqliteStore;
-use super::writer::POINTS_PATIENCE;
 use super::{StoreError, now_ms};
 use crate::key::Key;
 pub(super) use care::recover;
 use care::{expire_deadlines, forget_expired, note_timing, sweep};
-use line::submit;
 use pack::{PackedEnding, packed, packed_ending};
-use run::{beat, cancel, claim, hold, refuse, requeue, take, waits};
+use run::{beat, take, waits};
+
+/// How long a shard of a study waits for the results of its points.
+const POINTS_PATIENCE: Duration = Duration::from_secs(5);
 
 impl SqliteStore {
     async fn finish_job(&self, lease: Lease, ending: Ending) -> Result<Vec<JobId>, StoreError> {
@@ -45,7 +44,7 @@ impl SqliteStore {
             .ledger
             .write(move |connection| {
                 let ending = Arc::clone(&ending);
-                Box::pin(async move { finish(connection, lease, &ending, (now_ms(), keep_ms)).await })
+                Box::pin(async move { finish(connection, lease, &ending, keep_ms).await })
             })
             .await?;
         if let PackedEnding::Succeeded(row) = &*written
@@ -64,7 +63,8 @@ impl SqliteStore {
             .ledger
             .write(move |connection| {
                 let packed = Arc::clone(&packed);
-                Box::pin(async move { submit(connection, &packed, queue_limit, keep_ms, now_ms()).await })
+                let terms = Terms { queue_limit, now: now_ms(), keep_ms, engine: None };
+                Box::pin(async move { submit(connection, &packed, terms).await })
             })
             .await?;
         if let (Accepted::New(_), Some(row)) = (&accepted, &written.result) {
@@ -93,15 +93,6 @@ impl JobStore for SqliteStore {
     fn submit(&self, job: NewJob, queue_limit: u64) -> BoxFuture<'_, Result<Accepted, StoreError>> {
         Box::pin(self.submit_job(job, queue_limit))
     }
-    fn job(&self, id: JobId) -> BoxFuture<'_, Result<Option<JobRecord>, StoreError>> {
-        Box::pin(async move { Ok(record(&mut *self.reader().await?, id).await?) })
-    }
-    fn jobs(&self, query: JobQuery) -> BoxFuture<'_, Result<JobPage, StoreError>> {
-        Box::pin(async move { Ok(jobs::list(&mut *self.reader().await?, query).await?) })
-    }
-    fn job_inputs(&self, ids: Vec<JobId>, most: usize) -> BoxFuture<'_, Result<Vec<(JobId, Bytes)>, StoreError>> {
-        Box::pin(async move { Ok(jobs::inputs(&mut *self.reader().await?, &ids, most).await?) })
-    }
     fn counts(&self) -> BoxFuture<'_, Result<JobCounts, StoreError>> {
         Box::pin(self.count_jobs())
     }
@@ -112,66 +103,14 @@ impl JobStore for SqliteStore {
         })
     }
     fn take(&self, wanted: Wanted) -> BoxFuture<'_, Result<Next, StoreError>> {
-        Box::pin(self.ledger.write(move |connection| Box::pin(async move { take(connection, wanted, now_ms()).await })))
-    }
-    fn hold(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.ledger.write(move |connection| Box::pin(async move { hold(connection, id, now_ms()).await })))
-    }
-    fn claim(&self, id: JobId, lease: Lease, most: u32, problem: String) -> BoxFuture<'_, Result<Claimed, StoreError>> {
-        let keep_ms = self.keep_ms;
-        Box::pin(self.ledger.write(move |connection| {
-            let problem = problem.clone();
-            Box::pin(async move { claim(connection, id, lease, (most, &problem), keep_ms, now_ms()).await })
-        }))
-    }
-    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
-        Box::pin(self.finish_job(lease, ending))
-    }
-    fn add_shards(&self, lease: Lease, numbers: Vec<u32>) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(self.ledger.write(move |connection| {
-            let numbers = numbers.clone();
-            Box::pin(async move { shards::add(connection, lease, &numbers, "").await })
-        }))
-    }
-    fn shards(&self, parent: Key, numbers: Vec<u32>) -> BoxFuture<'_, Result<Vec<Shard>, StoreError>> {
-        Box::pin(async move { Ok(shards::over(&mut *self.reader().await?, parent, &numbers).await?) })
-    }
-    fn input_of(&self, key: Key) -> BoxFuture<'_, Result<Option<Bytes>, StoreError>> {
-        Box::pin(async move { Ok(shards::input_of(&mut *self.reader().await?, key).await?) })
-    }
-    fn release(&self, lease: Lease) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
-        Box::pin(
-            self.ledger.write(move |connection| Box::pin(async move { requeue(connection, &[lease], false).await })),
-        )
-    }
-    fn usage(&self, owner: String) -> BoxFuture<'_, Result<Usage, StoreError>> {
-        Box::pin(async move { Ok(usage(&mut *self.reader().await?, &owner).await?) })
-    }
-    fn kept_by_owner(&self) -> BoxFuture<'_, Result<Vec<(String, u64)>, StoreError>> {
-        Box::pin(async move { Ok(kept_by_owner(&mut *self.reader().await?).await?) })
-    }
-    fn note_work(&self, work: Vec<(String, f64)>) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.ledger.write(move |connection| {
-            let work = work.clone();
-            Box::pin(async move { note_work(connection, &work).await })
-        }))
-    }
-    fn refuse(&self, lease: Lease, owner: String, problem: String) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
-        let keep_ms = self.keep_ms;
-        Box::pin(self.ledger.write(move |connection| {
-            let (owner, problem) = (owner.clone(), problem.clone());
-            Box::pin(async move { refuse(connection, lease, (&owner, &problem), (now_ms(), keep_ms)).await })
-        }))
-    }
-    fn cancel(&self, id: JobId) -> BoxFuture<'_, Result<Option<Cancelled>, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(
             self.ledger
-                .write(move |connection| Box::pin(async move { cancel(connection, id, (now_ms(), keep_ms)).await })),
+                .write(move |connection| Box::pin(async move { take(connection, wanted, keep_ms, now_ms()).await })),
         )
     }
-    fn redo(&self, id: JobId) -> BoxFuture<'_, Result<(), StoreError>> {
-        Box::pin(self.ledger.write(move |connection| Box::pin(async move { set_back(connection, id).await.map(drop) })))
+    fn finish(&self, lease: Lease, ending: Ending) -> BoxFuture<'_, Result<Vec<JobId>, StoreError>> {
+        Box::pin(self.finish_job(lease, ending))
     }
     fn beat(&self, beats: Vec<Beat>) -> BoxFuture<'_, Result<Vec<Lease>, StoreError>> {
         Box::pin(self.ledger.write(move |connection| {
@@ -208,12 +147,6 @@ impl JobStore for SqliteStore {
             take_up.await
         })
     }
-    fn settle_callback(&self, due: DueCallback, tried: Tried) -> BoxFuture<'_, Result<bool, StoreError>> {
-        Box::pin(self.ledger.write(move |connection| {
-            let (due, tried) = (due.clone(), tried.clone());
-            Box::pin(async move { settle(connection, &due, &tried).await })
-        }))
-    }
     fn forget_expired(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
         let keep_ms = self.keep_ms;
         Box::pin(async move {
@@ -240,15 +173,15 @@ impl JobStore for SqliteStore {
             Box::pin(async move { note_timing(connection, &timing).await })
         }))
     }
-    fn timings(&self, limit: u32) -> BoxFuture<'_, Result<Vec<Timing>, StoreError>> {
-        Box::pin(async move { Ok(jobs::timings(&mut *self.reader().await?, limit).await?) })
-    }
 }
 
 impl SqliteStore {
-    /// A result was written beside the group writer.
+    /// A result was written with its job: what is written behind the answers leaves it out.
     fn kept(&self, key: &[u8], bytes: i64) {
         self.keys.add(key);
-        self.writer.added(bytes);
+        self.result_bytes.fetch_add(bytes, Ordering::Relaxed);
+        if let Some(key) = Key::from_bytes(key) {
+            self.writer.written(&key);
+        }
     }
 }

@@ -6,7 +6,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqlitePool};
 use tempfile::TempDir;
 
 use super::*;
-use crate::store::jobs::JobState;
+use crate::store::jobs::{JobShelf as _, JobState};
 use crate::store::sqlite::Keep;
 use crate::store::suite::{Place, job, keep, key, result, suite};
 use crate::store::{ResultStore, Store};

@@ -11,9 +11,7 @@ pub(in crate::store) mod shards;
 use std::time::Duration;
 
 use crate::key::Key;
-use crate::store::jobs::{
-    Accepted, Claim, Claimed, JobId, JobKind, JobRecord, Lease, NewJob, Next, Priority, Quota, Wanted,
-};
+use crate::store::jobs::{Accepted, Claim, Claimed, JobId, JobRecord, Lease, NewJob, Next, Priority, Quota, Wanted};
 use crate::store::sqlite::Keep;
 use crate::store::{Cursor, KeptResult, ResultPage, ResultQuery, Store};
 
@@ -87,7 +85,6 @@ pub(in crate::store) fn key(number: u32) -> Key {
 pub(in crate::store) fn job(number: u32) -> NewJob {
     NewJob {
         id: JobId::new(),
-        kind: JobKind::Calculation,
         calculator: "a".to_owned(),
         version: 1,
         key: key(number),
