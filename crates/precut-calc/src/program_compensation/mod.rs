@@ -12,10 +12,11 @@ mod made;
 mod measurement;
 mod model;
 
-pub use answer::output::{
-    CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
-    Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
-};
+pub use answer::compensated::{CompensatedProgram, CompensationProof, LineChange, LineLeftAlone, Transition};
+pub use answer::left::{CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, ProgramError, YieldedWork};
+pub use answer::moves::ReadMoves;
+pub use answer::output::Outcome;
+pub use answer::refed::{RefedFeeds, RefedLimit, RefedPrice, RefedProgram};
 pub use forward::{PreparedProgram, ProgramRun};
 pub use job::{
     CorrectTo, DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart,
