@@ -357,6 +357,31 @@ pub(crate) fn wave(lines: usize) -> Value {
     job
 }
 
+/// A cut along one line, and the same in blocks of a twentieth of a millimetre, which bend as one: the section is that of the moment, but
+/// for what nose and edges leave standing beside the tip.
+#[test]
+fn a_cut_in_short_blocks_comes_out_as_one() {
+    let of = |blocks: usize| {
+        let mut job = wave(60);
+        // An edge that leans back would stand beside the stock until it has passed what the block before left.
+        job["tools"][0]["cutting_edge_angle_deg"] = json!(90);
+        job["tools"][0]["nose_radius_mm"] = json!(0.8);
+        let mut text = "G21 G18 G40 G99\nT0101\nG97 S800 M3\nG0 X29. Z2.\nG1 F0.2 Z0.\n".to_owned();
+        for i in 1..=blocks {
+            let _ = writeln!(text, "Z{:.3}", -40.0 * i as f64 / blocks as f64);
+        }
+        job["nc_program"] = json!(text + "X34.\nG0 X60.\nM30\n");
+        let answer = solve(&job);
+        let cuts = &yielding(&answer).cuts;
+        let at = |z: f64| between(&cuts.z_mm, &cuts.deflection_um, z).unwrap();
+        (1..19).map(|i| at(399.0 - 2.0 * f64::from(i))).collect::<Vec<f64>>()
+    };
+    for (one, many) in of(1).into_iter().zip(of(800)) {
+        // Between its places the path is straight within 0.03 um.
+        assert!(one > 5.0 && (one - many).abs() < 0.03, "{one}, {many}");
+    }
+}
+
 /// What a line costs does not depend on how many there are: twice the lines, twice the places.
 #[test]
 fn long_programs_bend_as_short_ones_do() {

@@ -6,12 +6,13 @@
 use crate::calculator::{Failure, Monitor};
 use crate::certainty::Conformance;
 use crate::diameters::{Draw, Judged, Parts, Places};
+use crate::effects::DeflectionEffect;
 
 use super::job::Job;
 use super::made::Made;
 use super::model::correction::{Corrected, Transition};
 use super::model::stock::{Part, outline};
-use super::model::yielding::{ContourError, against, between, radius_at};
+use super::model::yielding::{ContourError, Yielded, against, between, radius_at};
 
 const UM_PER_MM: f64 = 1e3;
 /// Places at which errors are told, about, beside the ends and the extremes of every stretch.
@@ -20,7 +21,7 @@ const PLACES: usize = 120;
 const GOES_ON_MM: f64 = 2.5;
 
 /// Parts as a program leaves them.
-struct Leaves<'a> {
+pub(super) struct Leaves<'a> {
     made: Made,
     /// What is meant.
     meant: Vec<Part>,
@@ -39,17 +40,47 @@ pub(super) fn conformance(
     if job.tolerance.is_none() {
         return Ok(None);
     }
-    let mut run = job.clone();
-    if let Some(corrected) = corrected {
-        run.nc_program.clone_from(&corrected.text);
-        run.support_lines.clone_from(&corrected.support_lines);
-    }
-    let made = Made::of(run, monitor)?;
-    let meant = if job.drawing.is_empty() { given.to_vec() } else { against(&outline(&job.drawing).parts(), given) };
-    let proof = corrected.and_then(|corrected| corrected.proof.as_ref());
-    let places = places(&between(&meant, &made.base.real), proof.map_or(&[], |proof| &proof.transitions));
-    let leaves = Leaves { made, meant, places, monitor };
+    let leaves = Leaves::of(job, corrected, given, monitor)?;
     Judged::of(job.asked(), &leaves, monitor)?.map(|judged| judged.conformance(0.0)).transpose()
+}
+
+impl<'a> Leaves<'a> {
+    /// Of a job, with the program that is given back for it where there is one.
+    pub(super) fn of(
+        job: &Job,
+        corrected: Option<&Corrected>,
+        given: &[Part],
+        monitor: &'a dyn Monitor,
+    ) -> Result<Self, Failure> {
+        let mut run = job.clone();
+        if let Some(corrected) = corrected {
+            run.nc_program.clone_from(&corrected.text);
+            run.support_lines.clone_from(&corrected.support_lines);
+        }
+        let made = Made::of(run, monitor)?;
+        let meant =
+            if job.drawing.is_empty() { given.to_vec() } else { against(&outline(&job.drawing).parts(), given) };
+        let proof = corrected.and_then(|corrected| corrected.proof.as_ref());
+        let places = places(&between(&meant, &made.base.real), proof.map_or(&[], |proof| &proof.transitions));
+        Ok(Self { made, meant, places, monitor })
+    }
+
+    /// Largest and smallest error of the diameter of a part that is cut with effects beside those of its job, um.
+    pub(super) fn extremes_um(&self, effects: &[DeflectionEffect]) -> Result<[f64; 2], Failure> {
+        // Its places lie so close where the error bends that there is none between them.
+        let errors = self.errors_of(&self.made.with_effects(effects, self.monitor)?, 0.0);
+        let ends = |[high, low]: [f64; 2], error: &f64| [high.max(*error), low.min(*error)];
+        Ok(errors.iter().fold([f64::NEG_INFINITY, f64::INFINITY], ends))
+    }
+
+    /// Errors of the diameter of what is left, with so much more of it on the radius, um.
+    fn errors_of(&self, yielded: &Yielded, more_mm: f64) -> Vec<f64> {
+        let error = |&z_mm: &f64| {
+            let [left, meant] = [&yielded.real, &self.meant].map(|parts| radius_at(parts, z_mm));
+            2.0 * (left + more_mm - meant) * UM_PER_MM
+        };
+        self.places.z_mm.iter().map(error).collect()
+    }
 }
 
 impl Parts for Leaves<'_> {
@@ -59,11 +90,7 @@ impl Parts for Leaves<'_> {
 
     fn errors_um(&self, draw: &Draw, shift_um: f64) -> Result<Vec<f64>, Failure> {
         let yielded = self.made.with_draw(draw, 0.5 * shift_um / UM_PER_MM, self.monitor)?;
-        let error = |&z_mm: &f64| {
-            let [left, meant] = [&yielded.real, &self.meant].map(|parts| radius_at(parts, z_mm));
-            2.0 * (left + draw.scatter_mm - meant) * UM_PER_MM
-        };
-        Ok(self.places.z_mm.iter().map(error).collect())
+        Ok(self.errors_of(&yielded, draw.scatter_mm))
     }
 
     fn cost_much(&self) -> bool {

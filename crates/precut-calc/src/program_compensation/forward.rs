@@ -7,17 +7,18 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::calculator::{
-    Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis, JacobianColumn,
-    KnownOver, Missing, Monitor, NextRun, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows, Unnamed,
-    checkpoint,
+    Consequence, Cost, Design, Diagnosable, Example, Failure, Finding, ForwardModel, Hypotheses, Hypothesis,
+    JacobianColumn, KnownOver, Missing, Monitor, NextRun, NextRuns, Prediction, PrepareError, Quantity, Ranges, Rows,
+    Unnamed, checkpoint,
 };
 use crate::deflection_compensation::{
     DeflectionAllowances, DeflectionCompensation, DeflectionPoint, DeflectionRun, GAUGE_STEP_MM, Measure,
     PreparedDeflection, QUANTITIES, RELATIVE_STEP, Theory, columns_of_runs, difference, longest_run,
 };
-use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionEffect, JointUncertainty};
+use crate::effects::{Cause, DEFLECTION_CAUSES, DeflectionConditions, DeflectionEffect, JointUncertainty};
 
 use super::ProgramCompensation;
+use super::consequence::consequences;
 use super::job::{Job, SupportLines};
 use super::made::{Made, drive_ms, drive_ms_of};
 use super::measurement::ProgramMeasurement;
@@ -63,10 +64,14 @@ impl ProgramRun {
             job.nc_program.clone_from(own);
             job.support_lines.clone_from(&self.support_lines);
         }
-        let conditions = &mut job.conditions;
+        self.act_on(&mut job.conditions);
+        job
+    }
+
+    /// Its conditions in the place of those of the job.
+    pub(super) fn act_on(&self, conditions: &mut DeflectionConditions) {
         conditions.tool_path_at_start_m = self.tool_path_at_start_m.or(conditions.tool_path_at_start_m);
         conditions.warm_time_at_start_min = self.warm_time_at_start_min.or(conditions.warm_time_at_start_min);
-        job
     }
 }
 
@@ -266,6 +271,9 @@ impl ForwardModel for ProgramCompensation {
 impl Diagnosable for ProgramCompensation {
     type Row = ProgramMeasurement;
 
+    /// The others', and twice so many parts as are judged.
+    const PREDICTIONS: f64 = 700.0;
+
     const DIAGNOSES: &'static [Example] = &[Example {
         id: "soft_tailstock",
         title: "Two parts that a program made: the tailstock is softer than assumed",
@@ -330,6 +338,17 @@ impl Diagnosable for ProgramCompensation {
             next("tool_path_at_start_m", ProgramRun { tool_path_at_start_m: Some(0.0), ..typical.clone() }),
             next("warm_time_at_start_min", ProgramRun { warm_time_at_start_min: Some(0.0), ..typical.clone() }),
         ])
+    }
+
+    fn consequences(
+        job: &Job,
+        _quantity: &str,
+        runs: &[ProgramRun],
+        believed: &[DeflectionEffect],
+        acting: &[Vec<DeflectionEffect>],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Consequence>, Failure> {
+        consequences(job, runs, believed, acting, monitor)
     }
 
     fn predict_ms(job: &Job) -> f64 {

@@ -1,21 +1,23 @@
 //! The program that a shop has already (`program`): read as its control reads it.
 //!
 //! The way of a job: `job` -> `model` (the reader: bytes, words, blocks, moves; the blank, rigid and yielding) -> `answer` (moves,
-//! errors, the corrected program, pictures, what is said). `conformance` is how probable it is that the parts are good, `forward` the model as a function of its effects, for parts that were
-//! measured.
+//! errors, the corrected program, pictures, what is said). `conformance` is how probable it is that the parts are good, `forward` the model
+//! as a function of its effects, for parts that were measured, and `consequence` what a program leaves that is corrected with it.
 
 mod answer;
 mod conformance;
+mod consequence;
 mod forward;
 mod job;
 mod made;
 mod measurement;
 mod model;
 
-pub use answer::output::{
-    CompensatedProgram, CompensationProof, CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, LineChange, LineLeftAlone,
-    Outcome, ProgramError, ReadMoves, RefedFeeds, RefedLimit, RefedPrice, RefedProgram, Transition, YieldedWork,
-};
+pub use answer::compensated::{CompensatedProgram, CompensationProof, LineChange, LineLeftAlone, Transition};
+pub use answer::left::{CutsAlong, ErrorAlong, ErrorOfLines, LeftSurface, ProgramError, YieldedWork};
+pub use answer::moves::ReadMoves;
+pub use answer::output::Outcome;
+pub use answer::refed::{RefedFeeds, RefedLimit, RefedPrice, RefedProgram};
 pub use forward::{PreparedProgram, ProgramRun};
 pub use job::{
     CorrectTo, DecimalPoint, Dialect, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart,
@@ -50,7 +52,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 12,
+        version: 13,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \
@@ -155,18 +157,7 @@ impl Calculator for ProgramCompensation {
         warnings.extend(yielded.as_ref().and_then(|yielded| advice::off_by_more_than_deep(yielded, &finishing)));
         warnings.extend(job.force.iter().flat_map(|force| force.cautions("/force")));
         let driven = turned.as_ref().zip(yielded.as_ref());
-        let refed = refed(&program, job, driven, monitor)?;
-        let corrected = match (&refed, driven) {
-            (Some(refed), _) if !job.mode.kind.compensates() => Some(refed.alone(job)),
-            // Feeds change no line's place: supports, contour and blank are those of the given program.
-            (Some(refed), Some((turned, _))) => {
-                let mut again = job.clone();
-                again.nc_program.clone_from(&refed.text);
-                let corrected = corrected(&refed.program, &again, Some((turned, &refed.yielded)), monitor)?;
-                corrected.map(|corrected| refed.joined(corrected, &job.nc_program))
-            }
-            _ => corrected(&program, job, driven, monitor)?,
-        };
+        let (refed, corrected) = changed(&program, job, driven, monitor)?;
         warnings.extend(corrected.iter().flat_map(advice::of_corrected));
         if job.mode.kind != ModeKind::Read && corrected.is_none() {
             warnings.push(Finding::new("program_unsafe", "/nc_program"));
@@ -214,6 +205,38 @@ fn yielded(
     let finishing = stock::lines_that_finish(turned);
     let driven = yielding::Driven::as_it_is(&finishing);
     yielding::yielding(program, job, &holding, blank, driven, monitor).map(Some)
+}
+
+/// New feeds, and the program that is given back, as far as they are asked for.
+fn changed(
+    program: &reader::Program,
+    job: &Job,
+    driven: Option<(&stock::Turned, &yielding::Yielded)>,
+    monitor: &dyn Monitor,
+) -> Result<(Option<refeed::Refed>, Option<correction::Corrected>), Failure> {
+    let refed = refed(program, job, driven, monitor)?;
+    let corrected = match (&refed, driven) {
+        (Some(refed), _) if !job.mode.kind.compensates() => Some(refed.alone(job)),
+        // Feeds change no line's place: supports, contour and blank are those of the given program.
+        (Some(refed), Some((turned, _))) => {
+            let mut again = job.clone();
+            again.nc_program.clone_from(&refed.text);
+            let corrected = corrected(&refed.program, &again, Some((turned, &refed.yielded)), monitor)?;
+            corrected.map(|corrected| refed.joined(corrected, &job.nc_program))
+        }
+        _ => corrected(program, job, driven, monitor)?,
+    };
+    Ok((refed, corrected))
+}
+
+/// The program that is given back, and what the given one means; none where none is.
+fn given_back(job: &Job, monitor: &dyn Monitor) -> Result<Option<(correction::Corrected, Vec<stock::Part>)>, Failure> {
+    let Some(blank) = job.stock.as_ref().zip(job.program_zero_z_mm) else { return Ok(None) };
+    let program = reader::read(&job.nc_program, job.dialect, &job.reading, monitor)?;
+    let turned = stock::turned(&program, job, blank, monitor)?;
+    let Some(yielded) = yielded(&program, job, Some(&turned), monitor)? else { return Ok(None) };
+    let (_, corrected) = changed(&program, job, Some((&turned, &yielded)), monitor)?;
+    Ok(corrected.map(|corrected| (corrected, yielded.nominal)))
 }
 
 /// The program that leaves no error, where it is asked for.

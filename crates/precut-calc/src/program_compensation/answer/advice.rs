@@ -10,7 +10,9 @@ use super::super::model::correction::{Corrected, LeftAlone, WhyLeftAlone};
 use super::super::model::reader::{Kind, Nose, Program};
 use super::super::model::stock::{Doubt, FINISHES_MM, Stroke, Turned, Way, implausible_mm, strokes};
 use super::super::model::yielding::{CLOSE_MM, CutMove, FARTHEST_MM, PlaceOfMove, Yielded};
-use super::output::{CompensatedProgram, Outcome, RefedProgram};
+use super::compensated::CompensatedProgram;
+use super::output::Outcome;
+use super::refed::RefedProgram;
 use crate::force::{ForceModel, Reached, ReachedCut};
 
 /// Rapid moves that are told.

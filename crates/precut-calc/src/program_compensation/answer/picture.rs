@@ -8,7 +8,11 @@ use crate::diameters::DOUBT_LABELS;
 
 use super::super::job::{Job, ProgramStock};
 use super::super::model::reader::{CycleKind, Kind};
-use super::output::{CompensatedProgram, ErrorAlong, LeftSurface, LineChange, Outcome, Path, RefedFeeds, YieldedWork};
+use super::compensated::{CompensatedProgram, LineChange};
+use super::left::{ErrorAlong, LeftSurface, YieldedWork};
+use super::moves::Path;
+use super::output::Outcome;
+use super::refed::RefedFeeds;
 
 pub(crate) const FIGURE_IDS: &[&str] = &["program", doubt::ID];
 pub(crate) const TABLE_IDS: &[&str] = &["moves", "cycles", "surface", "errors", "cuts", "changes", "feeds", doubt::ID];

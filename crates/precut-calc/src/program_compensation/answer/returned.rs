@@ -9,7 +9,7 @@ use crate::certainty::JointlyKept;
 use super::super::job::{Dialect, Job};
 use super::super::model::correction::{ChangedLine, unified};
 use super::super::model::reader::lines_of_text;
-use super::output::{CompensatedProgram, LineChange};
+use super::compensated::{CompensatedProgram, LineChange};
 
 /// Most characters of the comment.
 const LONGEST: usize = 220;

@@ -5,7 +5,8 @@ use crate::diameters::{self, Uncertainty};
 use crate::machinability::ModelForm;
 use crate::material;
 
-use super::input::{CorrectTo, Job, ModeKind};
+use super::input::Job;
+use super::mode::{CorrectTo, ModeKind};
 
 /// Codes of the faults found here.
 pub(crate) const CODES: &[&str] = &[

@@ -2,10 +2,11 @@
 
 mod check;
 mod input;
+mod mode;
+mod reading;
 
 pub use crate::calculator::Dialect;
 pub(super) use check::CODES;
-pub use input::{
-    CorrectTo, DecimalPoint, Job, KeepOut, Mode, ModeKind, ProgramFeed, ProgramInclude, ProgramStart, ProgramStock,
-    ProgramTool, ProgramUnits, Reading, Refeed, StockRow, SupportLines, WordsOfX,
-};
+pub use input::{Job, KeepOut, ProgramInclude, ProgramStock, ProgramTool, StockRow, SupportLines};
+pub use mode::{CorrectTo, Mode, ModeKind, Refeed};
+pub use reading::{DecimalPoint, ProgramFeed, ProgramStart, ProgramUnits, Reading, WordsOfX};

@@ -8,6 +8,8 @@ mod calls;
 mod chords;
 mod compare;
 mod diff;
+mod line;
+mod numbers;
 mod plan;
 mod proof;
 mod rewrite;
@@ -25,12 +27,13 @@ use super::yielding::{Driven, Instead, Yielded, yielding};
 
 use calls::Calls;
 pub(crate) use diff::unified;
+pub(crate) use numbers::{decimal, number_like};
 pub(crate) use plan::LeftAlone;
 pub use plan::WhyLeftAlone;
 pub(crate) use proof::{FAILURE_CODES, Proof, Transition};
 use proof::{Failed, Task};
 use rewrite::Written;
-pub(crate) use rewrite::{ChangedLine, applied, decimal, number_like};
+pub(crate) use rewrite::{ChangedLine, applied};
 
 /// How often jumps of the shift are laid over twice the stretch because the work came out thin beside them.
 const MOST_TRIALS: usize = 3;

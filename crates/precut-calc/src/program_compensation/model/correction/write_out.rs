@@ -5,8 +5,10 @@ use std::ops::Range;
 
 use super::super::super::job::{Dialect, Mode};
 use super::super::reader::{Call, Feed, Kind, Program, ProgramMove, Speed, WordsOfLine};
+use super::line::{Line, Piece, Point, step};
+use super::numbers::decimal;
 use super::plan::Shifts;
-use super::rewrite::{Line, Piece, Point, Written, changed_line, decimal, step};
+use super::rewrite::{Written, changed_line};
 
 /// Least step of a feed and of a speed as they are written.
 const STEP_OF_FEED: f64 = 1e-6;

@@ -1,9 +1,11 @@
 //! From the text of a program to its moves (`program/2`).
 //!
-//! `lines` -> `lexer` (words with their places) -> `block` (modal state, one block after another) -> `moves`; `codes` has what
+//! `lines` -> `lexer` (words with their places) -> `block` (modal state, one block after another) with `values` (speeds, feeds, lengths)
+//! -> `act` (what a block does) -> `moves`; `codes` has what
 //! each control means by its words, `cycles`, `contour`, `subs` and `passes` expand what stands for many moves, `arcs` finds centres. Nothing is
 //! guessed: what is not understood is a fault with its place, or, where it leaves the position known, passed with a warning.
 
+mod act;
 mod arcs;
 mod block;
 mod codes;
@@ -17,6 +19,7 @@ mod moves;
 mod passes;
 mod state;
 mod subs;
+mod values;
 mod words_of_line;
 
 use std::collections::BTreeMap;

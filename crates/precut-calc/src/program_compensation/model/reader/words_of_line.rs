@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::super::super::job::DecimalPoint;
 use super::Reader;
-use super::block::{FOOT_M, Words};
+use super::block::Words;
 use super::lexer::{Block, Operand, Word};
 use super::moves::Speed;
 use super::state::INCH_MM;
+use super::values::FOOT_M;
 
 /// A number in the text.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,9 +9,9 @@ use std::sync::{Arc, OnceLock};
 use super::curve::{Curve, Piece, SAME_MM};
 
 /// Most parts of a run.
-const MOST: usize = 64;
+const MOST: usize = 24;
 /// Neighbouring runs that have no more parts than this together become one.
-const FEW: usize = 16;
+const FEW: usize = 8;
 
 /// A curve is followed so far above all work, mm.
 const BESIDE_MM: f64 = 0.01;
@@ -120,14 +120,6 @@ impl Chain {
         [head, (0..count - head).take_while(is_shared).count()]
     }
 
-    /// Becomes what another one is; what they share stays.
-    pub(crate) fn become_as(&mut self, other: &Self) {
-        let [head, tail] = self.shared_with(other);
-        let (own, its) = (head..self.runs.len() - tail, head..other.runs.len() - tail);
-        self.runs.splice(own, other.runs[its].iter().cloned());
-        self.highest_mm.clone_from(&other.highest_mm);
-    }
-
     /// Where it is no longer what another one is, from the first such place to the last, mm; none where both are one. What they share
     /// is not looked at.
     pub(crate) fn differs_from(&self, other: &Self) -> Option<[f64; 2]> {
@@ -188,6 +180,11 @@ impl Chain {
 
     /// How deep a curve lies in the work at the most, mm; below 0 it stays clear by so much.
     pub(crate) fn depth(&mut self, piece: &Piece) -> f64 {
+        self.depth_up_to(piece, f64::INFINITY)
+    }
+
+    /// The same, and once that is more than enough, something between both.
+    pub(super) fn depth_up_to(&mut self, piece: &Piece, enough_mm: f64) -> f64 {
         let first = self.run_behind(piece.x0 + SAME_MM);
         let count = self.runs[first..].partition_point(|run| run.x0() < piece.x1 - SAME_MM);
         let highest_mm = self.highest();
@@ -213,6 +210,9 @@ impl Chain {
                 for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
                     let at = a + share * (b - a);
                     deepest = deepest.max(part.piece.curve.at(at) - piece.curve.at(at).max(0.0));
+                }
+                if deepest > enough_mm {
+                    return deepest;
                 }
             }
         }
@@ -261,7 +261,10 @@ impl Chain {
     /// Puts parts in the place of those of a run; those that are one with their neighbour become one. Gives the last run
     /// that has any of them.
     fn replace(&mut self, at: usize, parts: &[Part]) -> usize {
-        self.highest_mm = OnceLock::new();
+        // Where it was not here, it still is where it was.
+        if self.highest_mm.get().is_some_and(|highest| self.runs[at].highest_mm >= *highest) {
+            self.highest_mm = OnceLock::new();
+        }
         let mut joined: Vec<Part> = Vec::with_capacity(parts.len());
         for part in parts {
             join(&mut joined, part);
@@ -343,10 +346,12 @@ fn cut_part(part: &Part, piece: &Piece, owner: usize, made: &mut Vec<Part>) -> b
         return false;
     }
     let mut is_changed = false;
-    let mut at = vec![x0, x1];
+    // Both ends of both, and two crossings twice.
+    let mut at = Vec::with_capacity(8);
+    at.extend([x0, x1]);
     at.extend([a, b].into_iter().filter(|&end| end > x0 + SAME_MM && end < x1 - SAME_MM));
     for raised in [0.0, CONTACT_MM] {
-        piece.curve.crossings(part.piece.curve, raised, [a, b], &mut at);
+        at.extend(piece.curve.crossings(part.piece.curve, raised, [a, b]));
     }
     at.sort_by(f64::total_cmp);
     for (i, ends) in at.windows(2).enumerate() {

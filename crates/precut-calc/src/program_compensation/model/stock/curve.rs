@@ -29,6 +29,17 @@ impl Curve {
         }
     }
 
+    /// Slope at a place inside; of a circle's end beside it.
+    pub(crate) fn slope(self, at: f64) -> f64 {
+        match self {
+            Self::Line { slope, .. } => slope,
+            Self::Arc { x, radius, is_upper, .. } => {
+                let half = (radius * radius - (at - x).powi(2)).max(f64::MIN_POSITIVE).sqrt();
+                if is_upper { (x - at) / half } else { (at - x) / half }
+            }
+        }
+    }
+
     fn raised(self, by: f64) -> Self {
         match self {
             Self::Line { x, r, slope } => Self::Line { x, r: r + by, slope },
@@ -37,7 +48,7 @@ impl Curve {
     }
 
     /// Places between two others at which it crosses another one raised by so much.
-    pub(crate) fn crossings(self, other: Self, raised: f64, within: [f64; 2], into: &mut Vec<f64>) {
+    pub(crate) fn crossings(self, other: Self, raised: f64, within: [f64; 2]) -> impl Iterator<Item = f64> {
         let other = other.raised(raised);
         let candidates = match (self, other) {
             (Self::Line { x, r, slope }, Self::Line { x: x1, r: r1, slope: s1 }) => {
@@ -56,18 +67,15 @@ impl Curve {
             }
             (Self::Arc { x: xa, r: ra, radius: a, .. }, Self::Arc { x: xb, r: rb, radius: b, .. }) => {
                 let (dx, dr) = (xb - xa, rb - ra);
-                let distance = dx.hypot(dr);
-                if distance <= 0.0 {
-                    return;
-                }
+                // About one centre there are none.
+                let distance = (dx * dx + dr * dr).sqrt();
                 let along = 0.5 * (distance + (a * a - b * b) / distance);
                 let half = (a * a - along * along).max(0.0).sqrt();
                 let (tx, tr) = (dx / distance, dr / distance);
                 [xa + along * tx - half * tr, xa + along * tx + half * tr]
             }
         };
-        let inside = |at: &f64| *at > within[0] + SAME_MM && *at < within[1] - SAME_MM;
-        into.extend(candidates.into_iter().filter(inside));
+        candidates.into_iter().filter(move |at| *at > within[0] + SAME_MM && *at < within[1] - SAME_MM)
     }
 }
 

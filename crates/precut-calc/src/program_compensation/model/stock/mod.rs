@@ -1,7 +1,8 @@
 //! The work while it is turned, on work and machine that do not yield (`program/3`).
 //!
 //! `curve` (radii over the axis) -> `chain` (the outline, and who made which part) <- `sweep` (what a tool covers on its way) and
-//! `edges` (where its edges end); `nose` is where a tool goes whose nose is compensated; `rigid` drives a program over a blank.
+//! `edges` (where its edges end); `take` is both together. `nose` is where a tool goes whose nose is compensated; `rigid` drives a
+//! program over a blank.
 
 mod chain;
 mod curve;
@@ -9,6 +10,7 @@ mod edges;
 mod nose;
 mod rigid;
 mod sweep;
+mod take;
 
 pub(crate) use chain::{Chain, Part, Sums};
 pub(crate) use curve::{Curve, Piece, SAME_MM};

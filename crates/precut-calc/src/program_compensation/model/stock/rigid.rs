@@ -10,7 +10,7 @@ use super::chain::{CONTACT_MM, Chain, step_owner};
 use super::curve::{Curve, Piece};
 use super::edges::EdgeEnds;
 use super::nose::{self, Compensated, Programmed};
-use super::sweep::{Shape, Swept, Way};
+use super::sweep::{Shape, Way};
 
 /// Why a program is not driven over its blank.
 pub(crate) const FAILURE_CODES: &[&str] = &["tool_missing", "nose_compensation_not_driven"];
@@ -305,16 +305,19 @@ pub(crate) fn turned(
                     told[0] = told[0].max(beyond_mm);
                 }
             }
-            let depth_mm = chain.turn(&shape, &way, one.line);
-            if depth_mm > CONTACT_MM {
+            // The depth of the first cut is told, of all others whether there is any.
+            let depth_mm = turned.first_cut.is_none().then(|| chain.depth_of(&shape, &way));
+            let cuts =
+                depth_mm.map_or_else(|| chain.reaches(&shape, &way, CONTACT_MM), |depth_mm| depth_mm > CONTACT_MM);
+            chain.cut_along(&shape, &way, one.line);
+            if cuts {
                 if let Some(steepest) = shape.falls_behind(&way, tool.tip_direction == 4) {
                     let told = turned.gouges.entry(one.line).or_insert([0.0, tool.minor_edge_angle_deg]);
                     told[0] = told[0].max(steepest);
                 }
                 turned.cuts = true;
-                if way.is_along() {
-                    turned.first_cut.get_or_insert(Cut { line: one.line, depth_mm });
-                }
+                let first = depth_mm.filter(|_| way.is_along()).map(|depth_mm| Cut { line: one.line, depth_mm });
+                turned.first_cut = turned.first_cut.or(first);
             }
         }
     }
@@ -339,68 +342,4 @@ fn own(chain: &Chain, turned: &mut Turned) {
         }
         turned.parts.push((part.piece, part.owner));
     }
-}
-
-impl Chain {
-    /// How deep a way lies in the work, mm; below 0 it stays clear.
-    pub(crate) fn depth_of(&mut self, shape: &Shape, way: &Way) -> f64 {
-        shape.sweep(way).pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// The same of a tool that ends where its edges do, where it says how long these are.
-    fn depth_of_tool(&mut self, tool: &ProgramTool, shape: &Shape, way: &Way) -> f64 {
-        match EdgeEnds::of(tool, shape) {
-            None => self.depth_of(shape, way),
-            Some(ends) => {
-                let covered = ends.covered(shape, way);
-                covered.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max)
-            }
-        }
-    }
-
-    /// Cuts along a way; how deep the tool went.
-    pub(crate) fn turn(&mut self, shape: &Shape, way: &Way, owner: usize) -> f64 {
-        let swept = shape.sweep(way);
-        // All of it in the work as it is before.
-        let deepest = swept.pieces.iter().map(|piece| self.depth(piece)).fold(f64::NEG_INFINITY, f64::max);
-        self.take_away(&swept, owner);
-        deepest
-    }
-
-    /// Cuts along a way, and does not say how deep.
-    pub(crate) fn cut_along(&mut self, shape: &Shape, way: &Way, owner: usize) {
-        self.take_away(&shape.sweep(way), owner);
-    }
-
-    /// Cuts along straight ways that follow each other.
-    pub(crate) fn cut_along_all(&mut self, shape: &Shape, ways: &[Way], owner: usize) {
-        match shape.sweep_all(ways) {
-            Some(swept) => self.take_away(&swept, owner),
-            None => ways.iter().for_each(|way| self.cut_along(shape, way, owner)),
-        }
-    }
-
-    fn take_away(&mut self, swept: &Swept, owner: usize) {
-        let above: Vec<Piece> = swept.pieces.iter().flat_map(above_axis).collect();
-        self.cut(&above, owner);
-        for &[x, from] in &swept.walls {
-            self.touch_wall(x, from, owner);
-        }
-    }
-}
-
-/// A piece where it is above the axis, and the axis where it is below.
-fn above_axis(piece: &Piece) -> Vec<Piece> {
-    if piece.lowest(piece.x0, piece.x1) >= 0.0 {
-        return vec![*piece];
-    }
-    let axis = Curve::Line { x: 0.0, r: 0.0, slope: 0.0 };
-    let mut at = vec![piece.x0, piece.x1];
-    piece.curve.crossings(axis, 0.0, [piece.x0, piece.x1], &mut at);
-    at.sort_by(f64::total_cmp);
-    let part = |ends: &[f64]| {
-        let is_above = piece.curve.at(0.5 * (ends[0] + ends[1])) >= 0.0;
-        Piece { x0: ends[0], x1: ends[1], curve: if is_above { piece.curve } else { axis } }
-    };
-    at.windows(2).map(part).collect()
 }

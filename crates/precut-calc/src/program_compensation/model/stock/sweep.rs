@@ -198,7 +198,8 @@ impl Shape {
 
     /// What the way leaves.
     pub(crate) fn sweep(&self, way: &Way) -> Swept {
-        let mut swept = Swept::default();
+        // Nose and edges at both ends, and what lies between.
+        let mut swept = Swept { pieces: Vec::with_capacity(8), walls: Vec::with_capacity(2) };
         match *way {
             Way::Line(from, to) => {
                 self.stand(from, &mut swept);

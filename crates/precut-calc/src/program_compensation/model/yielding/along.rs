@@ -3,12 +3,13 @@
 use crate::calculator::Failure;
 use crate::deflection_compensation::ToolPlace;
 
-use super::super::stock::Way;
+use super::super::stock::{Part, Way};
 use super::cut::{AXIS_MM, CutPlace, Cutting, Kept, Pace};
 use super::near::Near;
 
-/// Places stand no farther apart than this at first, mm.
+/// Places stand no farther apart than this at first, mm; of a short move, and there are four of them otherwise, than this.
 const APART_MM: f64 = 5.0;
+const APART_SHORT_MM: f64 = 0.1;
 /// On an arc no farther than by this angle, rad: the edge turns against the surface.
 const APART_RAD: f64 = std::f64::consts::PI / 180.0;
 /// And no nearer than this where the path jumps, mm.
@@ -17,7 +18,18 @@ const NEAREST_MM: f64 = 0.01;
 const MOST_AT_FIRST: f64 = 400.0;
 const MOST_PLACES: usize = 4000;
 /// Steps of the stock that get places of their own.
-const MOST_STEPS: usize = 200;
+const MOST_STEPS: usize = 100;
+
+/// Where an outline turns by less, and does not jump, the depth hardly does: slope, mm.
+const TURNS: f64 = 0.05;
+const JUMPS_MM: f64 = 1e-4;
+
+/// Whether the outline has a step or a corner between two parts of it.
+fn is_corner(pair: &[&Part]) -> bool {
+    let x = pair[1].piece.x0;
+    let [left, right] = [pair[0], pair[1]].map(|part| part.piece.curve);
+    (left.at(x) - right.at(x)).abs() > JUMPS_MM || (left.slope(x) - right.slope(x)).abs() > TURNS
+}
 
 /// Path and time in the cut so far.
 #[derive(Debug, Clone, Copy, Default)]
@@ -98,7 +110,8 @@ impl Along<'_> {
     fn first_shares(&self) -> Vec<f64> {
         let length = self.way.length_mm();
         let turned = if let Way::Arc { turn, .. } = self.way { turn.abs() } else { 0.0 };
-        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(4.0, MOST_AT_FIRST);
+        let least = (length / APART_SHORT_MM).ceil().clamp(1.0, 4.0);
+        let count = (length / APART_MM).max(turned / APART_RAD).ceil().clamp(least, MOST_AT_FIRST);
         // At most MOST_AT_FIRST.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = count as usize;
@@ -109,8 +122,14 @@ impl Along<'_> {
             && high - low > NEAREST_MM
         {
             let stock: &Near<'_> = &self.cutting.nominal;
-            let steps = stock.parts_between(low, high).flat_map(|part| [part.piece.x0, part.piece.x1]);
-            for x in steps.take(MOST_STEPS).filter(|x| low < *x && *x < high) {
+            let parts: Vec<&Part> = stock.parts_between(low, high).collect();
+            // What does not turn much is seen from places that are near anyhow.
+            let is_seen = |pair: &&[&Part]| length >= 4.0 * APART_SHORT_MM || is_corner(pair);
+            let corners = parts.windows(2).filter(is_seen).map(|pair| pair[1].piece.x0);
+            // The ends of all of it stand beside no other part.
+            let ends = [parts.first().map(|part| part.piece.x0), parts.last().map(|part| part.piece.x1)];
+            let steps = corners.chain(ends.into_iter().flatten());
+            for x in steps.filter(|x| low < *x && *x < high).take(MOST_STEPS) {
                 shares.extend([-NEAREST_MM, NEAREST_MM].map(|by| (x + by - from[0]) / (to[0] - from[0])));
             }
         }

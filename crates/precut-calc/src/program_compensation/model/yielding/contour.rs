@@ -1,7 +1,7 @@
 //! What comes out against what was meant, along the contour.
 
 use super::super::stock::{Part, SAME_MM};
-use super::drive::Yielded;
+use super::yielded::Yielded;
 
 /// Places stand no farther apart than this, mm.
 const APART_MM: f64 = 2.0;

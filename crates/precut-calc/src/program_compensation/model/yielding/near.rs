@@ -4,18 +4,19 @@ use super::super::stock::{Chain, Part, Shape, Way};
 
 /// So much beside what the tool can reach is looked at with it, mm.
 const BESIDE_MM: f64 = 0.5;
+/// As many parts take no second allocation.
+const AS_USUAL: usize = 64;
 
-/// Parts of an outline about a move.
-pub(crate) struct Near<'a> {
-    chain: &'a Chain,
+/// What of an outline lies about a move, as it was when that was asked.
+pub(crate) struct About {
     parts: Vec<Part>,
     from_mm: f64,
     to_mm: f64,
 }
 
-impl<'a> Near<'a> {
+impl About {
     /// What a tool with edges up to the highest place of an outline reaches along a way.
-    pub(crate) fn of(chain: &'a Chain, shape: &Shape, way: &Way) -> Self {
+    pub(crate) fn of(chain: &Chain, shape: &Shape, way: &Way) -> Self {
         let ends = way.ends();
         // An arc may reach farther than its ends.
         let beyond = if let Way::Arc { radius, .. } = way { 2.0 * radius } else { 0.0 };
@@ -30,14 +31,25 @@ impl<'a> Near<'a> {
         };
         let from_mm = ends[0][0].min(ends[1][0]) - beyond + reach[0] - BESIDE_MM;
         let to_mm = ends[0][0].max(ends[1][0]) + beyond + reach[1] + BESIDE_MM;
-        Self { chain, parts: chain.parts_between(from_mm, to_mm).copied().collect(), from_mm, to_mm }
+        let mut parts = Vec::with_capacity(AS_USUAL);
+        parts.extend(chain.parts_between(from_mm, to_mm).copied());
+        Self { parts, from_mm, to_mm }
     }
+}
 
+/// An outline about a move; farther away than its tool reaches it may be that before the moves that it goes on from.
+pub(crate) struct Near<'a> {
+    pub(crate) chain: &'a Chain,
+    pub(crate) about: &'a About,
+}
+
+impl Near<'_> {
     /// The parts that lie between two places, wholly or not.
     pub(crate) fn parts_between(&self, from: f64, to: f64) -> impl Iterator<Item = &Part> {
-        let is_near = self.from_mm <= from && to <= self.to_mm;
-        let first = self.parts.partition_point(|part| part.piece.x1 <= from);
-        let near = if is_near { &self.parts[first..] } else { &[] };
+        let About { parts, from_mm, to_mm } = self.about;
+        let is_near = *from_mm <= from && to <= *to_mm;
+        let first = parts.partition_point(|part| part.piece.x1 <= from);
+        let near = if is_near { &parts[first..] } else { &[] };
         let far = (!is_near).then(|| self.chain.parts_between(from, to));
         near.iter().take_while(move |part| part.piece.x0 < to).chain(far.into_iter().flatten())
     }

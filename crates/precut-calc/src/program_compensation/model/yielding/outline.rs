@@ -224,7 +224,6 @@ impl Placed {
     fn crossings(&self, stock: &Near<'_>, into: &mut Vec<f64>) {
         let ([low, high], lowest) = self.extent();
         into.push(self.nose * self.lead);
-        let mut found = Vec::with_capacity(2);
         let mut last = f64::NEG_INFINITY;
         for part in stock.parts_between(low, high).filter(|part| part.piece.highest() >= lowest) {
             let piece = part.piece;
@@ -241,18 +240,15 @@ impl Placed {
                 // Its other half has the same crossings.
                 let [x, r] = self.centre;
                 let nose = Curve::Arc { x, r, radius: self.nose, is_upper: false };
-                found.clear();
-                nose.crossings(piece.curve, 0.0, within, &mut found);
-                for &x in &found {
+                for x in nose.crossings(piece.curve, 0.0, within) {
                     self.push_angle([x, piece.curve.at(x)], into);
                 }
             }
             if self.along[0].abs() > FLAT {
                 let slope = self.along[1] / self.along[0];
                 let edge = Curve::Line { x: self.edge[0], r: self.edge[1], slope };
-                found.clear();
-                edge.crossings(piece.curve, 0.0, within, &mut found);
-                into.extend(found.iter().map(|x| self.nose * self.lead + (x - self.edge[0]) / self.along[0]));
+                let lengths = edge.crossings(piece.curve, 0.0, within);
+                into.extend(lengths.map(|x| self.nose * self.lead + (x - self.edge[0]) / self.along[0]));
             }
         }
     }
