@@ -5,6 +5,7 @@ use crate::certainty::Quantity;
 use crate::receptance_fit::ReceptanceFit;
 
 use super::answer::conformance::draws;
+use super::answer::lobes::{CLAMP_MAP_DEPTHS, CLAMP_MAP_SPEEDS};
 use super::job::{Asked, Case, Job, PartClamping, Yielding, clamped, guessed, range_rpm, uncertainties};
 use super::model::{self, MOST_OSCILLATIONS};
 
@@ -160,6 +161,11 @@ fn cost_of_modes(job: &Job) -> Cost {
         }
         if job.asks(Asked::Lobes) && job.lobes.map {
             parts.push((speeds * f64::from(job.lobes.depths) * mean, "/lobes/depths"));
+            if clamping.is_some() {
+                let (across, down) =
+                    (speeds.min(f64::from(CLAMP_MAP_SPEEDS)), f64::from(job.lobes.depths.min(CLAMP_MAP_DEPTHS)));
+                parts.push((across * down * (mean + 0.2 * clamping_ms), "/clamping/stations"));
+            }
             bytes += 40.0 * speeds * f64::from(job.lobes.depths);
         }
     }

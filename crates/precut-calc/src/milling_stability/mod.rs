@@ -14,10 +14,10 @@ pub use answer::conformance::MillingConformance;
 pub use answer::output::{
     ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
     ContactUse, CrossingMethod, CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind,
-    LeadingMultiplier, LobeIntervals, MeasuredSide, MillingBoundary, MillingClamping, MillingCost, MillingEngagement,
-    MillingForces, MillingLobes, MillingMap, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions,
-    Outcome, PocketLimit, ProposalKind, ReceptanceLimit, RigidLimits, SpeedCurve, SpeedPocket, SpeedStatus,
-    UnstableInterval, WallSide, WallSurface, YieldingSide,
+    LeadingMultiplier, LobeIntervals, MeasuredSide, MillingBoundary, MillingClampMap, MillingClamping, MillingCost,
+    MillingEngagement, MillingForces, MillingLobes, MillingMap, MillingMotion, MillingState, MillingVerdict, ModeShare,
+    OtherAssumptions, Outcome, PocketLimit, ProposalKind, ReceptanceLimit, RigidLimits, SpeedCurve, SpeedPocket,
+    SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 pub use job::{
     Asked, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing,

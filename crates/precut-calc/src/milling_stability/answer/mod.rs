@@ -4,7 +4,7 @@ pub(super) mod advice;
 mod clamping;
 pub(super) mod conformance;
 mod growth;
-mod lobes;
+pub(super) mod lobes;
 mod measured;
 pub(super) mod output;
 pub(super) mod picture;
