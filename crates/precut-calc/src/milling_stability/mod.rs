@@ -20,11 +20,11 @@ pub use answer::output::{
     SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 pub use job::{
-    Asked, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing,
-    GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle,
-    Milling, MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty, NothingYields,
-    PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
-    YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
+    Asked, ChipsAbout, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce,
+    FlankRubbing, GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce,
+    MillSpindle, Milling, MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty,
+    NothingYields, PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch,
+    Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 pub use measured::{CutMargin, MillingAllowances, MillingMeasurement, MillingPoint, MillingRun, ObservedCut};
 

@@ -261,6 +261,9 @@ pub struct LeadingMultiplier {
     /// Estimated error of the modulus: two orders compared, and what the eigenpair leaves.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub modulus_error: f64,
+    /// The modulus about undisturbed chips, where teeth stand out and that above is about the motion that the chips force; else null.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub smooth_chips_modulus: Option<f64>,
     /// Frequency of the largest share; null where so many oscillations fit into a period that they lie side by side.
     #[schema(extensions(("x-unit" = json!("Hz"))))]
     pub chatter_frequency_hz: Option<f64>,
