@@ -1,8 +1,9 @@
 //! Slow cuts: hundreds of oscillations from tooth to tooth.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::draw::Draw;
 use crate::fixture_support::{checked, example, outcome, said, solve, with};
 use precut_calc::calculator::{Calculator, Failure, Figure, Message, Monitor};
 use precut_calc::fixture_stability::{FixtureOutcome, FixtureStability, FixtureState, multiplier_modulus};
@@ -45,6 +46,103 @@ fn the_closed_form_goes_on_where_elements_end() {
         // What differs besides is the phase at which neighbouring lobes cross: the closed form takes the worst.
         assert!((elements / closed - 1.0).abs() < error / closed, "{elements} {closed} {error}: {job}");
     }
+}
+
+/// |mu| of a workpiece with one mode by the equation of the page itself, at hundreds of places and phases.
+fn dense_modulus(job: &Value, natural_rad_per_s: f64, damping_ratio: f64) -> f64 {
+    const PLACES: u32 = 200;
+    const PHASES: u32 = 180;
+    let number = |pointer: &str| job.pointer(pointer).unwrap().as_f64().unwrap();
+    let pitch = std::f64::consts::TAU / number("/cutter/teeth");
+    let half = 0.5 * number("/cut/width_mm");
+    let offset = number("/cut/offset_mm");
+    let radius = 0.5 * number("/cutter/diameter_mm");
+    let arc = [((offset + half) / radius).min(1.0).acos(), ((offset - half) / radius).max(-1.0).acos()];
+    let (k, rho) = (number("/force/chip_thickness_exponent"), number("/force/radial_ratio"));
+    let stiffness: f64 =
+        number("/fixture/movable_joint/stiffness_n_per_mm") + number("/fixture/fixed_joint/stiffness_n_per_mm");
+    let level =
+        (1.0 - k) * number("/force/coefficient") * number("/cut/depth_mm") * number("/cut/feed_mm_per_tooth").powf(-k);
+    let slope = |since: f64| -> f64 {
+        let teeth =
+            (0..40).map(|tooth| since + f64::from(tooth) * pitch).filter(|angle| (arc[0]..arc[1]).contains(angle));
+        teeth.map(|angle| level / stiffness * angle.sin().powf(1.0 - k) * (angle.cos() + rho * angle.sin())).sum()
+    };
+    let mut ends = [0.0, arc[0] % pitch, arc[1] % pitch, pitch];
+    ends.sort_by(f64::total_cmp);
+    let seconds_per_rad = 60.0 / (number("/cut/spindle_speed_rpm") * std::f64::consts::TAU);
+    let places: Vec<(f64, f64)> = ends
+        .windows(2)
+        .flat_map(|pair| {
+            let step = (pair[1] - pair[0]) / f64::from(PLACES);
+            (0..PLACES).map(move |i| (pair[0] + (f64::from(i) + 0.5) * step, step))
+        })
+        .map(|(since, step)| (slope(since), step * seconds_per_rad))
+        .collect();
+    // s^2 + 2 zeta w s + w^2 (1 + (1 - 1/mu) W/C) = 0: the root with the larger real part, integrated over a tooth period.
+    let growth = |ln_modulus: f64, phase: f64| -> f64 {
+        let (re, im) = (1.0 - (-ln_modulus).exp() * phase.cos(), (-ln_modulus).exp() * phase.sin());
+        let of = |(slope, seconds): &(f64, f64)| {
+            let (a, b) = (damping_ratio * damping_ratio - 1.0 - slope * re, -slope * im);
+            natural_rad_per_s * ((0.5 * (a.hypot(b) + a)).max(0.0).sqrt() - damping_ratio) * seconds
+        };
+        places.iter().map(of).sum()
+    };
+    let fastest = |ln_modulus: f64| {
+        let step = std::f64::consts::PI / f64::from(PHASES);
+        let all: Vec<f64> = (0..=PHASES).map(|i| growth(ln_modulus, f64::from(i) * step)).collect();
+        let best = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).unwrap();
+        let neighbours = best.checked_sub(1).zip(all.get(best + 1));
+        // The vertex of the parabola through the largest and its neighbours.
+        neighbours.map_or(all[best], |(before, after)| {
+            let bend = all[before] - 2.0 * all[best] + after;
+            all[best] - (all[before] - after).powi(2) / (8.0 * bend.min(-1e-300))
+        })
+    };
+    let (mut low, mut high) = (-30.0, 690.0);
+    for _ in 0..34 {
+        let middle = 0.5 * (low + high);
+        if fastest(middle) > middle { low = middle } else { high = middle }
+    }
+    (0.5_f64 * (low + high)).exp()
+}
+
+/// The error that is told holds, for one mode: the same equation at many times as many places and phases, of drawn cuts.
+#[test]
+fn the_error_of_a_slow_modulus_holds() {
+    let mut draw = Draw::new(34);
+    let count = std::env::var("PRECUT_SLOW").ok().and_then(|count| count.parse().ok()).unwrap_or(12);
+    let mut missed = 0;
+    for _ in 0..count {
+        let mut job = at(200.0, draw.between(0.3, 4.0));
+        job["cutter"]["teeth"] = json!(draw.between(2.0, 12.0) as u32);
+        job["cut"]["width_mm"] = json!(draw.between(20.0, 100.0));
+        job["cut"]["offset_mm"] = json!(draw.between(-20.0, 20.0));
+        job["force"]["chip_thickness_exponent"] = json!(draw.between(0.0, 0.5));
+        job["fixture"]["movable_joint"]["damping_n_s_per_mm"] = json!(draw.between(0.8, 4.0));
+        let oscillations = 200.0 * draw.between(0.0, 4.0).exp();
+        let number = |pointer: &str| job.pointer(pointer).unwrap().as_f64().unwrap();
+        let both = |field: &str| {
+            ["movable_joint", "fixed_joint"]
+                .map(|joint| number(&format!("/fixture/{joint}/{field}")))
+                .iter()
+                .sum::<f64>()
+        };
+        let mass = number("/fixture/workpiece_mass_kg");
+        let natural = (1e3 * both("stiffness_n_per_mm") / mass).sqrt();
+        let damping_ratio = 1e3 * both("damping_n_s_per_mm") / (2.0 * mass * natural);
+        let rpm = 60.0 * natural / (std::f64::consts::TAU * oscillations * number("/cutter/teeth"));
+        let job = with(&job, "/cut/spindle_speed_rpm", json!(rpm));
+        let (modulus, error) = multiplier_modulus(&checked(&job).unwrap()).unwrap();
+        let off = (modulus - dense_modulus(&job, natural, damping_ratio)).abs();
+        missed += i32::from(off > error);
+        if count > 12 {
+            let of_form = modulus * (1.0 / (std::f64::consts::TAU * oscillations));
+            println!("{oscillations:.0} |mu| {modulus:.6} off {off:.2e} told {error:.2e} form >= {of_form:.2e}");
+        }
+        assert!(modulus < 1e-12 || error < 0.05 * modulus, "{modulus} {error}: {job}");
+    }
+    assert_eq!(missed, 0, "of {count}");
 }
 
 /// The limit follows from the circle criterion: below it nothing grows at any speed, for 0 <= W <= its largest value.

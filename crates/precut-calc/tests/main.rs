@@ -94,6 +94,7 @@ mod machinability_fit;
 mod machinability_library;
 mod machinability_real;
 mod material_library;
+mod milling_about;
 mod milling_answers;
 mod milling_certainty;
 mod milling_clamping;

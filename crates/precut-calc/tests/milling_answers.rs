@@ -657,7 +657,7 @@ fn growth_within_a_modulation_is_told() {
 fn a_motion_as_large_as_the_run_out_is_warned_of() {
     let warns = |run_out_um: f64, feed: f64| {
         let patch = json!({ "cutter": { "radial_offset_um": [0, run_out_um] }, "cut": { "depth_mm": 0.3, "feed_mm_per_tooth": feed },
-                            "analyses": ["verdict", "motion"] });
+                            "about": "smooth_chips", "analyses": ["verdict", "motion"] });
         let told = solve(&merged(example("two_modes"), &patch));
         let swing = told.outcome.motion.unwrap().peak_to_peak_um;
         (told.warnings.iter().any(|of| of.code == "pairing_of_undisturbed_chips"), swing > 0.5 * run_out_um)
@@ -667,6 +667,34 @@ fn a_motion_as_large_as_the_run_out_is_warned_of() {
         assert_eq!(warned, is_large, "{run_out_um} {feed}");
     }
     assert!(warns(2.0, 0.2).0 && !warns(60.0, 0.005).0);
+}
+
+/// Of a cutter with run-out the modulus about undisturbed chips stands beside that about the motion that they force; where one of both says
+/// chatter, that is warned of.
+#[test]
+fn both_moduli_of_a_cutter_with_run_out_are_told() {
+    let cutter = json!({ "cutter": { "radial_offset_um": [0, 25] }, "cut": { "feed_mm_per_tooth": 0.05 } });
+    let job = merged(example("two_modes"), &cutter);
+    let smooth = merged(job.clone(), &json!({ "about": "smooth_chips" }));
+    let limit = solve(&merged(smooth.clone(), &json!({ "analyses": ["intervals"] }))).outcome.first_limit_mm.unwrap();
+    let both = |depth_mm: f64| {
+        let cut = json!({ "cut": { "depth_mm": depth_mm }, "analyses": ["verdict"] });
+        let [told, undisturbed] = [&job, &smooth].map(|job| solve(&merged(job.clone(), &cut)));
+        let of = |told: &Told| told.outcome.multiplier.clone().unwrap();
+        let (about, without) = (of(&told), of(&undisturbed));
+        assert!((about.smooth_chips_modulus.unwrap() / without.modulus - 1.0).abs() < 1e-9, "{about:?} {without:?}");
+        assert!(without.smooth_chips_modulus.is_none());
+        let says = told.warnings.iter().any(|of| of.code == "about_changes_verdict");
+        assert_eq!(says, (about.modulus < 1.0) != (without.modulus < 1.0), "{about:?}");
+        (about.modulus, says)
+    };
+    // Beside the limit of undisturbed chips, on the side on which they say the other.
+    let (at_limit, _) = both(limit);
+    assert!((at_limit - 1.0).abs() > 0.01, "{at_limit}");
+    let beside = if at_limit > 1.0 { 0.999 } else { 1.001 };
+    assert!(both(beside * limit).1 && !both(0.5 * limit).1);
+    let even = solve(&merged(example("two_modes"), &json!({ "analyses": ["verdict"] })));
+    assert!(even.outcome.multiplier.unwrap().smooth_chips_modulus.is_none());
 }
 
 /// Unequal pitch and a varying speed of the specification are proposed, and such jobs have the limits that are told.

@@ -556,3 +556,48 @@ fn contacts_at_the_corners_of_a_vise_are_that_vise() {
     close(by_contacts.certain_slip_below_n.unwrap(), by_vise.certain_slip_below_n.unwrap(), 1e-6, "certain");
     assert_eq!(by_contacts.contacts.len(), by_vise.contacts.len());
 }
+
+/// Every place of the map of the clamp force is the job there: what it asks for in the forced motion, at rest and by the mean, and nothing
+/// where it chatters.
+#[test]
+fn the_map_of_the_clamp_force_is_the_job_at_every_place() {
+    let job = merged(
+        example("clamped"),
+        &json!({
+            "work": { "kind": "modes", "modes": [
+                { "direction": [0, 1, 0], "frequency_hz": 700, "damping_ratio": 0.05, "stiffness_n_per_mm": 60_000 }
+            ] },
+            "lobes": { "from_rpm": 3000, "to_rpm": 9000, "speeds": 4, "depths": 3, "map": true },
+            "limits": { "depth_max_mm": 3 },
+            "analyses": ["lobes", "clamping"]
+        }),
+    );
+    let map = solve(&job).outcome.lobes.unwrap().clamp_map.unwrap();
+    assert_eq!((map.spindle_speed_rpm.len(), map.depth_mm.len(), map.clamp_force_n.len()), (4, 3, 12));
+    let (mut held, mut quiet, mut dynamic) = (0, 0, 0.0_f64);
+    for (row, depth_mm) in map.depth_mm.iter().enumerate() {
+        for (column, rpm) in map.spindle_speed_rpm.iter().enumerate() {
+            let there = merged(
+                job.clone(),
+                &json!({ "cut": { "spindle_speed_rpm": rpm, "depth_mm": depth_mm }, "analyses": ["verdict", "clamping"] }),
+            );
+            let got = solve(&there).outcome;
+            let (asked, of_map) = (got.clamping.as_ref().unwrap(), map.clamp_force_n[row * 4 + column]);
+            close(map.mean_n[row].unwrap(), asked.against_mean_n.unwrap(), 1e-9, "mean");
+            quiet += i32::from(got.verdict.unwrap().state != MillingState::Chatter);
+            if let Some(force) = of_map {
+                held += 1;
+                close(force, asked.clamp_force_min_n.unwrap(), 1e-9, "in motion");
+                dynamic = dynamic.max((force / map.static_n[row].unwrap() - 1.0).abs());
+            }
+        }
+        let rigid = merged(
+            job.clone(),
+            &json!({ "work": { "kind": "rigid" }, "cut": { "depth_mm": depth_mm }, "analyses": ["clamping"] }),
+        );
+        let still = solve(&rigid).outcome.clamping.unwrap().clamp_force_min_n.unwrap();
+        close(map.static_n[row].unwrap(), still, 1e-9, "at rest");
+    }
+    assert!(held == quiet && (4..12).contains(&held), "{held} of {quiet}");
+    assert!(dynamic > 0.05, "{dynamic}");
+}

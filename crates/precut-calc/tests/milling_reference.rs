@@ -7,8 +7,8 @@ use std::path::Path;
 
 use precut_calc::calculator::Unwatched;
 use precut_calc::milling_stability::model::{
-    Cut, Kind, Law, Milling, Mode, Orders, Rotation, Rubbing, Search, Side, Structure, Tooth, Wall, mean_stiffness,
-    scan, statics, unstable, zeroth,
+    About, Cut, Kind, Law, Milling, Mode, Orders, Rotation, Rubbing, Search, Side, Structure, Tooth, Wall,
+    mean_stiffness, scan, statics, unstable, zeroth,
 };
 use serde_json::Value;
 
@@ -75,6 +75,7 @@ fn milling(input: &Value) -> Milling {
             coefficient_n_per_mm: number(damping, "coefficient_n_per_mm"),
             friction: number(damping, "friction"),
         }),
+        about: About::SmoothChips,
     }
 }
 

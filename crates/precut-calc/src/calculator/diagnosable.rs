@@ -89,6 +89,18 @@ pub trait Diagnosable:
         monitor: &dyn Monitor,
     ) -> Result<NextRuns<Self::Run, Self::Point>, Failure>;
 
+    /// The same where it is known what may be right: the effects of every set of causes that may be, the leading one first. A room in
+    /// which runs tell most where these disagree has them there.
+    fn next_runs_between(
+        job: &Self::Job,
+        rows: &Rows<Self::Run, Self::Point>,
+        ranges: Ranges<'_>,
+        _likely: &[Vec<Self::Effect>],
+        monitor: &dyn Monitor,
+    ) -> Result<NextRuns<Self::Run, Self::Point>, Failure> {
+        Self::next_runs(job, rows, ranges, monitor)
+    }
+
     /// What a person may see of every cut with these effects, where the quantity is a class and every row a cut. A row is `None`
     /// where its cut cannot be computed; the whole is `None` where the model predicts nothing beside the margin.
     fn outlooks(

@@ -5,6 +5,7 @@ use crate::certainty::Quantity;
 use crate::receptance_fit::ReceptanceFit;
 
 use super::answer::conformance::draws;
+use super::answer::lobes::{CLAMP_MAP_DEPTHS, CLAMP_MAP_SPEEDS};
 use super::job::{Asked, Case, Job, PartClamping, Yielding, clamped, guessed, range_rpm, uncertainties};
 use super::model::{self, MOST_OSCILLATIONS};
 
@@ -13,6 +14,10 @@ use super::model::{self, MOST_OSCILLATIONS};
 const ELEMENT_MS: f64 = 0.03;
 const SPACES_GROW: f64 = 60.0;
 const RESTARTED: f64 = 800.0;
+/// Multipliers that the search for the motion takes about which a cutter with run-out is looked at.
+const ABOUT: f64 = 40.0;
+/// Better speeds that are tried about it at most.
+const TRIED: f64 = 3.0;
 /// What is made whatever the cut.
 const ANY_MS: f64 = 2.0;
 /// Multipliers that a search over the depth takes on average, and the share of it that the first crossing alone takes.
@@ -115,6 +120,14 @@ fn cost_of_modes(job: &Job) -> Cost {
         let searches = if is_slow { PER_SEARCH } else { 4.0 };
         parts.push((searches * here, "/cut/spindle_speed_rpm"));
     }
+    let is_about = case.milling.has_run_out()
+        && matches!(case.milling.about, model::About::ForcedMotion)
+        && !case.rotation.varies()
+        && !is_slow;
+    let about_ms = if is_about { ABOUT * here } else { 0.0 };
+    if job.asks(Asked::Verdict) || job.asks(Asked::Motion) {
+        parts.push((about_ms, "/about"));
+    }
     if job.asks(Asked::Motion) {
         let repeats = case.milling.teeth_are_alike() && !case.rotation.varies();
         let solved = if repeats { 0.5 } else { 2.0 } * by_elements_ms(&case, &case.rotation);
@@ -151,7 +164,7 @@ fn cost_of_modes(job: &Job) -> Cost {
         let speeds = f64::from(job.lobes.speeds);
         parts.push((REFINED * speeds * steps * PER_SEARCH * mean, "/lobes/speeds"));
         if job.asks(Asked::Speeds) {
-            parts.push((TRIALS * mean, "/lobes/speeds"));
+            parts.push((TRIALS * mean + TRIED * about_ms, "/lobes/speeds"));
             let others = job.cut.widths_mm.len() as f64;
             parts.push((others * (TRIALS + REFINED * speeds * steps * PER_SEARCH) * mean, "/cut/widths_mm"));
             if clamping.is_some_and(|of| of.clamp_force().is_some()) {
@@ -160,6 +173,11 @@ fn cost_of_modes(job: &Job) -> Cost {
         }
         if job.asks(Asked::Lobes) && job.lobes.map {
             parts.push((speeds * f64::from(job.lobes.depths) * mean, "/lobes/depths"));
+            if clamping.is_some() {
+                let (across, down) =
+                    (speeds.min(f64::from(CLAMP_MAP_SPEEDS)), f64::from(job.lobes.depths.min(CLAMP_MAP_DEPTHS)));
+                parts.push((across * down * (mean + 0.2 * clamping_ms), "/clamping/stations"));
+            }
             bytes += 40.0 * speeds * f64::from(job.lobes.depths);
         }
     }

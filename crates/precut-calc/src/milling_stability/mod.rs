@@ -14,17 +14,17 @@ pub use answer::conformance::MillingConformance;
 pub use answer::output::{
     ClampCriterion, ClampDeciding, ClampLift, ClampRemedy, ClampRemedyKind, ClampStation, ClampTurn, ClampingStatus,
     ContactUse, CrossingMethod, CutterProposal, DepthLine, ForceOfSide, FrequencyShare, InstabilityKind,
-    LeadingMultiplier, LobeIntervals, MeasuredSide, MillingBoundary, MillingClamping, MillingCost, MillingEngagement,
-    MillingForces, MillingLobes, MillingMap, MillingMotion, MillingState, MillingVerdict, ModeShare, OtherAssumptions,
-    Outcome, PocketLimit, ProposalKind, ReceptanceLimit, RigidLimits, SpeedCurve, SpeedPocket, SpeedStatus,
-    UnstableInterval, WallSide, WallSurface, YieldingSide,
+    LeadingMultiplier, LobeIntervals, MeasuredSide, MillingBoundary, MillingClampMap, MillingClamping, MillingCost,
+    MillingEngagement, MillingForces, MillingLobes, MillingMap, MillingMotion, MillingState, MillingVerdict, ModeShare,
+    OtherAssumptions, Outcome, PocketLimit, ProposalKind, ReceptanceLimit, RigidLimits, SpeedCurve, SpeedPocket,
+    SpeedStatus, UnstableInterval, WallSide, WallSurface, YieldingSide,
 };
 pub use job::{
-    Asked, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing,
-    GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce, MillSpindle,
-    Milling, MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty, NothingYields,
-    PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch, Yielding,
-    YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
+    Asked, ChipsAbout, Coordinate, Cut, CutLimits, CutStation, CutWidth, Cutter, DirectionPart, EdgeForce,
+    FlankRubbing, GrippingContacts, GrippingPoint, GrippingVise, Job, KienzleForce, LobePlane, MechanisticForce,
+    MillSpindle, Milling, MillingCorrelation, MillingQuantity, MillingUncertainQuantity, MillingUncertainty,
+    NothingYields, PartClamping, PowerForce, RubbingSource, SpeedVariation, ToothHelix, ToothOffset, ToothPitch,
+    Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 pub use measured::{CutMargin, MillingAllowances, MillingMeasurement, MillingPoint, MillingRun, ObservedCut};
 
@@ -53,7 +53,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 8,
+        version: 9,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \

@@ -13,4 +13,4 @@ mod slow;
 pub use krylov::{Eigenvalue, largest, largest_paced, largest_pair_paced};
 pub use map::PeriodMap;
 pub use rule::{Matrix, Propagator, Rule, exponential, norm, product, times};
-pub use slow::{SlowGrowth, SlowMultiplier, SlowPeriod};
+pub use slow::{SLOW_PHASES, SlowGrowth, SlowMultiplier, SlowPeriod};

@@ -15,8 +15,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
-/// Phases of the multiplier that are looked at, evenly up to pi: of its conjugate everything is the same.
-const PHASES: usize = 12;
+/// Phases of the multiplier that do: evenly up to pi, since of its conjugate everything is the same.
+pub const SLOW_PHASES: usize = 12;
 /// Logarithm of the modulus below which a disturbance is as good as gone.
 const GONE: f64 = -30.0;
 /// Steps of the secant, and how near is enough.
@@ -59,6 +59,8 @@ struct Growth {
 pub struct SlowPeriod<'a> {
     /// How long each place lasts, s.
     pub shares_s: &'a [f64],
+    /// Steps between the phases of the multiplier that are looked at, from 0 to pi.
+    pub phases: usize,
     /// At a place and for a share 1 - 1/mu of the coupling: the eigenvalue with the largest real part, 1/s.
     pub leading: &'a dyn Fn(usize, Complex<f64>) -> Complex<f64>,
 }
@@ -106,16 +108,16 @@ impl SlowPeriod<'_> {
     /// Over the phases of a multiplier of one modulus: the fastest growth with its phase, and the largest growth inside the period.
     fn fastest<E>(&self, ln_modulus: f64, look: &mut impl FnMut() -> Result<(), E>) -> Result<(Growth, f64, f64), E> {
         let coupling = |phase: f64| Complex::new(1.0, 0.0) - Complex::from_polar((-ln_modulus).exp(), -phase);
-        let step = PI / PHASES as f64;
-        let mut all = Vec::with_capacity(PHASES + 1);
-        for number in 0..=PHASES {
+        let step = PI / self.phases as f64;
+        let mut all = Vec::with_capacity(self.phases + 1);
+        for number in 0..=self.phases {
             look()?;
             all.push(self.at(coupling(number as f64 * step)));
         }
-        let best = (0..=PHASES).max_by(|&a, &b| all[a].whole.total_cmp(&all[b].whole)).unwrap_or(0);
+        let best = (0..=self.phases).max_by(|&a, &b| all[a].whole.total_cmp(&all[b].whole)).unwrap_or(0);
         let within = all.iter().map(|growth| growth.within).fold(0.0, f64::max);
         let (mut growth, mut phase) = (all[best], best as f64 * step);
-        if best > 0 && best < PHASES {
+        if best > 0 && best < self.phases {
             let (before, next) = (all[best - 1].whole, all[best + 1].whole);
             let bend = before - 2.0 * growth.whole + next;
             if bend < 0.0 {

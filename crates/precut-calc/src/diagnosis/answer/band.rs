@@ -14,7 +14,10 @@ const MOST_SETS: usize = 3;
 /// Half of the 95 % interval of a normal distribution, standard deviations.
 const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 
-/// ln of a limit at the speeds of the first curve: its mean over the sets, and its variance.
+/// Two speeds nearer than this share are one.
+const ONE_SPEED: f64 = 1e-6;
+
+/// ln of a limit at the speeds of a curve: its mean over the sets, and its mean square.
 struct Moments {
     mean: Vec<f64>,
     square: Vec<f64>,
@@ -41,23 +44,36 @@ pub(super) fn band<M: Diagnosable>(
         let Ok(effects) = bound.acting(believed) else { return Ok(Vec::new()) };
         Ok(M::class_limits(bound.prepared(), &effects, monitor)?.map_or_else(Vec::new, |limits| limits.curves))
     };
-    let mut found: Vec<LimitCurve> = Vec::new();
-    let mut moments: Vec<Moments> = Vec::new();
+    let mut each_set: Vec<(f64, Vec<Vec<LimitCurve>>)> = Vec::with_capacity(sets.len());
     for (share, set) in sets {
-        let each = with_open(weighing, set, &limits)?;
-        if found.is_empty() {
-            found.clone_from(&each[0]);
-            moments = found.iter().map(Moments::of).collect();
-        }
-        for (index, (curve, sums)) in found.iter().zip(&mut moments).enumerate() {
-            let own: Vec<Option<&LimitCurve>> = each.iter().map(|curves| curves.get(index)).collect();
-            sums.add(curve, share / whole, &own);
-        }
+        each_set.push((share / whole, with_open(weighing, set, &limits)?));
     }
-    for (curve, sums) in found.iter_mut().zip(&moments) {
-        sums.put(curve);
-    }
-    Ok(found)
+    Ok(put_together(&each_set))
+}
+
+/// The band of every width and feed, from the share of every set, its own limits, and those along its directions.
+fn put_together(each_set: &[(f64, Vec<Vec<LimitCurve>>)]) -> Vec<LimitCurve> {
+    let own = |index: usize| each_set.iter().filter_map(move |(_, each)| each.first()?.get(index));
+    let of_curve = |(index, first): (usize, &LimitCurve)| {
+        let mut curve = LimitCurve { spindle_speed_rpm: all_speeds(own(index)), ..first.clone() };
+        let mut sums = Moments::of(&curve);
+        for (share, each) in each_set {
+            let curves: Vec<Option<&LimitCurve>> = each.iter().map(|curves| curves.get(index)).collect();
+            sums.add(&curve, *share, &curves);
+        }
+        sums.put(&mut curve);
+        curve
+    };
+    let first = each_set.first().and_then(|(_, each)| each.first());
+    first.map_or_else(Vec::new, |curves| curves.iter().enumerate().map(of_curve).collect())
+}
+
+/// Every speed at which one of the limits is known, rising: each set has lobes of its own, and bends where they do.
+fn all_speeds<'a>(curves: impl Iterator<Item = &'a LimitCurve>) -> Vec<f64> {
+    let mut speeds: Vec<f64> = curves.flat_map(|curve| curve.spindle_speed_rpm.iter().copied()).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup_by(|next, known| (*next / *known - 1.0).abs() < ONE_SPEED);
+    speeds
 }
 
 /// The limits of a set at its fit, and one standard deviation along each direction that the rows leave open.
@@ -111,10 +127,13 @@ fn ln_limit(curve: &LimitCurve, speed_rpm: f64) -> Option<f64> {
     let speeds = &curve.spindle_speed_rpm;
     let ln = |k: usize| curve.depth_mm.get(k).copied().flatten().filter(|depth| *depth > 0.0).map(f64::ln);
     let behind = speeds.partition_point(|known| *known < speed_rpm);
-    if speeds.get(behind).is_some_and(|known| (known / speed_rpm - 1.0).abs() < 1e-12) {
+    if speeds.get(behind).is_some_and(|known| (known / speed_rpm - 1.0).abs() < ONE_SPEED) {
         return ln(behind);
     }
     let before = behind.checked_sub(1)?;
+    if (speeds[before] / speed_rpm - 1.0).abs() < ONE_SPEED {
+        return ln(before);
+    }
     let (from, to) = (speeds[before], *speeds.get(behind)?);
     let (a, b) = (ln(before)?, ln(behind)?);
     Some(a + (b - a) * (speed_rpm - from) / (to - from))
@@ -161,6 +180,17 @@ mod tests {
         // Half the distance is one standard deviation of two alike shares.
         assert!((found.depth_mm[0].unwrap() - 2.0).abs() < 1e-12);
         assert!((found.high_mm[0].unwrap().ln() - 2.0_f64.ln() - HALF_WIDTH * 2.0_f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_band_bends_where_any_set_does() {
+        // Lobes that meet at 2 of one set, at 2.5 of the other.
+        let one = curve(&[1.0, 4.0, 1.0]);
+        let other = LimitCurve { spindle_speed_rpm: vec![1.0, 2.5, 3.0], ..curve(&[1.0, 4.0, 1.0]) };
+        let band = put_together(&[(0.5, vec![vec![one]]), (0.5, vec![vec![other]])]);
+        assert_eq!(band[0].spindle_speed_rpm, [1.0, 2.0, 2.5, 3.0]);
+        // At 2.5 the first has come down half way: 2 and 4, whose mean is the root of 8.
+        assert!((band[0].depth_mm[2].unwrap() - 8.0_f64.sqrt()).abs() < 1e-12, "{band:?}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::diagnosis::calculator::{JobOf, base_of};
 use crate::diagnosis::causes::ranking::SetWeight;
 use crate::diagnosis::causes::subject::{Setting, Subject};
 use crate::diagnosis::input::DiagnosisOptions;
-use crate::diagnosis::model::outlook::{Outlooks, Told};
+use crate::diagnosis::model::outlook::{Outlooks, Told, likely_effects};
 use crate::diagnosis::rows::data::{Data, Layout};
 use crate::diagnosis::rows::sparse::Sparse;
 use crate::diagnosis::statistics::whiten::Whitener;
@@ -93,7 +93,15 @@ pub(in crate::diagnosis) fn next_measurement<M: Diagnosable>(
     };
     let separation_now = now.separation(&other);
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
-    let runs = M::next_runs(&job.job, rows, Ranges(&job.options.ranges), monitor)?;
+    let ranges = Ranges(&job.options.ranges);
+    let runs = match weighing.foundation.data.sides {
+        // Of a class a run tells most where what may be right is on either side of its limit.
+        Some(_) => {
+            let likely = likely_effects::<M>(job, rows, weighing, [Some(leader), rival], monitor)?;
+            M::next_runs_between(&job.job, rows, ranges, &likely, monitor)?
+        }
+        None => M::next_runs(&job.job, rows, ranges, monitor)?,
+    };
     if let Some(outlooks) = Outlooks::of::<M>(job, &runs, weighing, [Some(leader), rival], monitor)? {
         let members = [leader.members.clone(), rival.map_or_else(Vec::new, |rival| rival.members.clone())];
         return Ok(planning.telling(&runs, &outlooks, members, separation_now));

@@ -226,6 +226,32 @@ fn quiet(outlook: &Outlook) -> f64 {
     link::log_probability(outlook.margin / outlook.scatter).exp().clamp(1e-12, 1.0 - 1e-12)
 }
 
+/// Effects of the likeliest sets without a remainder at their sizes, the leading one first; none where a set has no place in the model.
+pub(super) fn likely_effects<M: Diagnosable>(
+    job: &JobOf<M>,
+    rows: &Rows<M::Run, M::Point>,
+    weighing: &Weighing<'_>,
+    contenders: [Option<&SetWeight>; 2],
+    monitor: &dyn Monitor,
+) -> Result<Vec<Vec<M::Effect>>, Failure> {
+    // One row does: what is asked are effects, not what they do to it.
+    let Some((run, point)) = rows.points.first() else { return Ok(Vec::new()) };
+    let one = Rows { runs: rows.runs.get(*run).cloned().into_iter().collect(), points: vec![(0, point.clone())] };
+    let (base, known) = base_of::<M>(job);
+    let Ok(prepared) = M::prepare(&base, &one, &job.quantity, monitor) else { return Ok(Vec::new()) };
+    let every = DiagnosisOptions::default();
+    let bound = Bound::<M>::new(prepared, known, job.allowances.clone(), &job.quantity, &every, monitor)?;
+    let mut likely = likely(weighing, contenders);
+    let leader = contenders[0].map_or(&[][..], |set| set.members.as_slice());
+    likely.sort_by_key(|set| set.members != leader);
+    let mut effects = Vec::with_capacity(likely.len());
+    for set in likely {
+        let Some(settings) = translated(weighing, &bound, &set.settings) else { return Ok(Vec::new()) };
+        effects.push(bound.with_settings(&settings)?);
+    }
+    Ok(effects)
+}
+
 /// The likeliest sets without a remainder, nothing among them, leader and rival in any case.
 fn likely<'a>(weighing: &'a Weighing<'_>, contenders: [Option<&SetWeight>; 2]) -> Vec<&'a SetWeight> {
     let whole: f64 = weighing.sets.iter().filter(|set| set.remainder.is_none()).map(|set| set.posterior).sum();

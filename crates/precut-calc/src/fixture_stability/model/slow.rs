@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use crate::calculator::{Failure, Monitor, checkpoint};
-use crate::num::dde::{Matrix, SlowPeriod, product};
+use crate::num::dde::{Matrix, SLOW_PHASES, SlowPeriod, product};
 use crate::num::quadrature::gauss_legendre;
 use crate::num::roots::aberth;
 
@@ -19,8 +19,11 @@ const OSCILLATIONS: f64 = 120.0;
 const DECAYS: f64 = 40.0;
 /// From so many oscillations on in any case.
 const ALWAYS: f64 = 2000.0;
-/// Places of a stretch of the tooth period.
+/// Places of a part of a stretch of the tooth period.
 const PLACES: usize = 16;
+/// Parts of a stretch and phases of the multiplier: usually, and of the finer look that tells the error.
+const USUAL: (u32, usize) = (1, SLOW_PHASES);
+const FINER: (u32, usize) = (3, 2 * SLOW_PHASES + 1);
 /// What grows so many times inside a tooth period marks the surface although it dies out from tooth to tooth.
 pub(in crate::fixture_stability) const GROWN: f64 = 50.0;
 /// A growth beyond this, as a logarithm, is told as this.
@@ -103,7 +106,8 @@ pub(in crate::fixture_stability) struct SlowCut<const N: usize> {
     /// Stretch and slope of the force over the level.
     places: Vec<(usize, f64)>,
     shares_s: Vec<f64>,
-    /// Error of the modulus over it.
+    phases: usize,
+    /// Error over the modulus of the form itself.
     error: f64,
 }
 
@@ -115,26 +119,39 @@ impl<const N: usize> SlowCut<N> {
         cutting: &Cutting,
         working: Working,
     ) -> Self {
+        Self::looked_at(system, holding, cutting, working, USUAL)
+    }
+
+    fn looked_at(
+        system: &System<N>,
+        holding: &Holding,
+        cutting: &Cutting,
+        working: Working,
+        (parts, phases): (u32, usize),
+    ) -> Self {
         let seconds_per_rad = cutting.tooth_period_s(working.spindle_rpm) / cutting.pitch_rad();
         let (points, weights) = gauss_legendre(PLACES);
         let (mut stretches, mut places, mut shares_s) = (Vec::new(), Vec::new(), Vec::new());
         for (number, stretch) in cutting.stretches().iter().enumerate() {
             stretches.push(Characteristic::new(&damped(system, cutting, &working, stretch.teeth), &system.b));
-            for (point, weight) in points.iter().zip(&weights) {
-                let angle = stretch.from_rad + point * stretch.length_rad();
+            let part_rad = stretch.length_rad() / f64::from(parts);
+            let of_part =
+                |part: u32| points.iter().zip(&weights).map(move |(c, w)| ((f64::from(part) + c) * part_rad, w));
+            for (since_rad, weight) in (0..parts).flat_map(of_part) {
+                let angle = stretch.from_rad + since_rad;
                 let slopes =
                     (0..cutting.phases()).map(|phase| cutting.chip_slope(stretch, angle, phase, working.feed_mm));
                 let slope = slopes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
                 places.push((number, slope));
-                shares_s.push(weight * stretch.length_rad() * seconds_per_rad);
+                shares_s.push(weight * part_rad * seconds_per_rad);
             }
         }
         let (oscillations, decays) = in_a_period(holding, cutting, working.spindle_rpm);
         let merged = TAU / (8.0_f64.sqrt() * decays.max(DECAYS / 2.0));
-        Self { stretches, places, shares_s, error: merged * merged + TAU.recip() / oscillations }
+        Self { stretches, places, shares_s, phases, error: merged * merged + TAU.recip() / oscillations }
     }
 
-    /// The largest multiplier at the level Cp H^(1-mu), and its estimated error.
+    /// The largest multiplier at the level Cp H^(1-mu), and the error of the form itself.
     pub(in crate::fixture_stability) fn multiplier(
         &self,
         level: f64,
@@ -144,7 +161,7 @@ impl<const N: usize> SlowCut<N> {
             let (stretch, slope) = self.places[place];
             self.stretches[stretch].leading(coupling * (level * slope))
         };
-        let period = SlowPeriod { shares_s: &self.shares_s, leading: &leading };
+        let period = SlowPeriod { shares_s: &self.shares_s, phases: self.phases, leading: &leading };
         let found = period.multiplier(|| checkpoint(monitor))?;
         let modulus = found.ln_modulus.min(FAR).exp();
         let multiplier = Multiplier {
@@ -180,7 +197,8 @@ impl Multiplier {
     }
 }
 
-/// The multiplier of a slow working point, with the joints `closed`.
+/// The multiplier of a slow working point, with the joints `closed`. Its error is that of the form, and what three times as many places and
+/// twice as many phases change: the fastest root passes from one to another with a bend, and the fastest phase from one to the next.
 pub(in crate::fixture_stability) fn slow_point<const N: usize>(
     holding: &Holding,
     cutting: &Cutting,
@@ -189,5 +207,9 @@ pub(in crate::fixture_stability) fn slow_point<const N: usize>(
     monitor: &dyn Monitor,
 ) -> Result<(Multiplier, f64), Failure> {
     let system = holding.system::<N>(closed);
-    SlowCut::new(&system, holding, cutting, working).multiplier(cutting.level(working.depth_mm), monitor)
+    let level = cutting.level(working.depth_mm);
+    let looked_at = |look| SlowCut::looked_at(&system, holding, cutting, working, look).multiplier(level, monitor);
+    let (usual, _) = looked_at(USUAL)?;
+    let (finer, of_form) = looked_at(FINER)?;
+    Ok((finer, of_form + (finer.modulus - usual.modulus).abs()))
 }

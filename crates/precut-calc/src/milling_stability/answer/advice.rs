@@ -39,6 +39,7 @@ pub(in crate::milling_stability) const WARNING_CODES: &[&str] = &[
     "no_damping",
     "fit_changes_limit",
     "pairing_of_undisturbed_chips",
+    "about_changes_verdict",
     "near_chatter_limit",
     "depth_not_examined",
     "multiplier_not_converged",
@@ -191,10 +192,18 @@ pub(in crate::milling_stability) fn warnings(study: &Study<'_>, outcome: &Outcom
             "um",
         ));
     }
+    found.extend(outcome.multiplier.as_ref().and_then(about_motion));
     if aside.no_motion {
         found.push(Finding::new("no_forced_motion", "/cut/spindle_speed_rpm"));
     }
     found
+}
+
+/// A cut that is stable about undisturbed chips and not about the motion that they force, or the other way round.
+fn about_motion(multiplier: &LeadingMultiplier) -> Option<Finding> {
+    let smooth = multiplier.smooth_chips_modulus?;
+    let differ = (multiplier.modulus < 1.0) != (smooth < 1.0);
+    differ.then(|| Finding::new("about_changes_verdict", "/about").measured(multiplier.modulus, smooth, "1"))
 }
 
 /// Modes that the job itself states, with where they stand.

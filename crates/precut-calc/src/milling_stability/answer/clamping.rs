@@ -90,6 +90,15 @@ impl Study<'_> {
         Ok(asked_n(held, &self.loads_of(held, cut)?).ok())
     }
 
+    /// The same of the static force at its largest, and of the mean force, at a depth; whatever the speed.
+    pub(super) fn static_clamp_n(&self, held: &Held, depth_mm: f64) -> Result<[Option<f64>; 2], Failure> {
+        let cut = Cut { depth_mm, ..self.cut() };
+        let peaks = self.loads(held, &Carried::new(&cut, None))?.all;
+        let mean = statics(cut.milling, depth_mm, self.monitor)?.mean_n;
+        let means: Vec<Load> = held.points_mm.iter().map(|point| self.load(&mean, *point)).collect();
+        Ok([peaks, means].map(|loads| asked_n(held, &loads).ok().map(|force| force.max(0.0))))
+    }
+
     /// The loads of a cut over a period at all places.
     pub(super) fn loads_of(&self, held: &Held, cut: &Cut<'_>) -> Result<Vec<Load>, Failure> {
         let forced = known(self, cut)?;

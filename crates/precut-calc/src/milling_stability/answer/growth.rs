@@ -2,7 +2,7 @@
 
 use crate::calculator::Failure;
 
-use super::super::model::{Cut, GROWN, Multiplier, SlowMultiplier};
+use super::super::model::{About, Cut, GROWN, Milling, Multiplier, SlowMultiplier};
 use super::Study;
 use super::output::{FrequencyShare, LeadingMultiplier};
 
@@ -41,13 +41,23 @@ impl Growth {
 /// A multiplier with the share of each mode in its energy, where that is known.
 type Told = (LeadingMultiplier, Option<Vec<f64>>);
 
-/// The leading multiplier; `None` of a slow cut whose teeth are not followed by one alike.
-pub(super) fn multiplier(study: &Study<'_>) -> Result<Option<Told>, Failure> {
+/// The leading multiplier, about the motion that the chips force where that is known; `None` of a slow cut whose teeth are not followed by
+/// one alike.
+pub(super) fn multiplier(study: &Study<'_>, about: Option<&Milling>) -> Result<Option<Told>, Failure> {
     let cut = study.cut();
     if study.is_slow {
         return if cut.repeats() { Ok(Some((slow_multiplier(study, &cut)?, None))) } else { Ok(None) };
     }
     let unsolved = Failure::NotConverged { what: "largest Floquet multiplier", residual: 1.0, iterations: 0 };
+    let smooth_chips_modulus = match about {
+        Some(milling) => {
+            let milling = Milling { about: About::SmoothChips, ..milling.clone() };
+            let found = study.orders.with_error(&Cut { milling: &milling, ..cut }, study.monitor)?;
+            found.map(|(found, _)| found.modulus())
+        }
+        None => None,
+    };
+    let cut = about.map_or(cut, |milling| Cut { milling, ..cut });
     let (found, modulus_error) = study.orders.with_error(&cut, study.monitor)?.ok_or(unsolved)?;
     let shares = study.orders.shares(&cut, study.monitor)?;
     let varies = cut.rotation.varies();
@@ -69,6 +79,7 @@ pub(super) fn multiplier(study: &Study<'_>) -> Result<Option<Told>, Failure> {
         growth_per_s,
         settling_time_s: (growth_per_s < 0.0).then(|| DECAYED.ln() / growth_per_s),
         modulus_error,
+        smooth_chips_modulus,
         chatter_frequency_hz: aliases.first().map(|alias| alias.frequency_hz),
         aliases,
         transient_growth,
@@ -92,6 +103,7 @@ fn slow_multiplier(study: &Study<'_>, cut: &Cut<'_>) -> Result<LeadingMultiplier
         growth_per_s,
         settling_time_s: (growth_per_s < 0.0).then(|| DECAYED.ln() / growth_per_s),
         modulus_error,
+        smooth_chips_modulus: None,
         chatter_frequency_hz: Some(frequency_hz),
         aliases: Vec::new(),
         transient_growth: Some(within),

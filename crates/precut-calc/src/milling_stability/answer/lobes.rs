@@ -4,14 +4,18 @@ use rayon::prelude::*;
 
 use crate::calculator::{Failure, Message, checkpoint};
 
-use super::super::job::range_rpm;
+use super::super::job::{Held, range_rpm};
 use super::super::model::MOST_OSCILLATIONS;
 use super::super::model::{Cut, Rotation, Scan, Search, scan};
-use super::output::{LobeIntervals, MillingBoundary, MillingLobes, MillingMap, SpeedStatus};
+use super::clamping::yields;
+use super::output::{LobeIntervals, MillingBoundary, MillingClampMap, MillingLobes, MillingMap, SpeedStatus};
 use super::{Study, intervals};
 
 /// Speeds or columns between two looks whether anybody still waits; every multiplier looks for itself besides.
 const PER_LOOK: usize = 16;
+/// Speeds and depths of the map of the clamp force at most: every place takes a forced motion and its loads.
+pub(in crate::milling_stability) const CLAMP_MAP_SPEEDS: u32 = 24;
+pub(in crate::milling_stability) const CLAMP_MAP_DEPTHS: u32 = 10;
 /// Neighbours on the boundary that differ by more than this share are looked at more closely, so often at most.
 const NEIGHBOURS: f64 = 0.08;
 const ROUNDS: u32 = 2;
@@ -107,6 +111,10 @@ pub(super) fn first_mm(study: &Study<'_>, rotation: Rotation) -> Result<Option<f
 
 pub(super) fn lobes(study: &Study<'_>, rows: &[Row]) -> Result<MillingLobes, Failure> {
     let map = if study.job.lobes.map { Some(map(study)?) } else { None };
+    let clamp_map = match &study.held {
+        Some(held) if study.job.lobes.map => Some(clamp_map(study, held)?),
+        _ => None,
+    };
     let mut boundary = MillingBoundary::default();
     let mut stretches = LobeIntervals::default();
     for row in rows {
@@ -123,16 +131,47 @@ pub(super) fn lobes(study: &Study<'_>, rows: &[Row]) -> Result<MillingLobes, Fai
             stretches.kind.push(stretch.kind);
         }
     }
-    Ok(MillingLobes { boundary, intervals: stretches, map, examined_to_mm: study.examined_mm })
+    Ok(MillingLobes { boundary, intervals: stretches, map, clamp_map, examined_to_mm: study.examined_mm })
+}
+
+/// Even speeds and depths of the plane, so many of each.
+fn places(study: &Study<'_>, speeds: u32, depths: u32) -> (Vec<f64>, Vec<f64>) {
+    let (from_rpm, to_rpm) = range_rpm(study.job, study.case.rotation.spindle_rpm);
+    let speed = |k: u32| from_rpm + (to_rpm - from_rpm) * f64::from(k) / f64::from(speeds - 1);
+    let depth = |k: u32| study.examined_mm * f64::from(k) / f64::from(depths);
+    ((0..speeds).map(speed).collect(), (1..=depths).map(depth).collect())
+}
+
+/// What cuts ask of the clamping.
+fn clamp_map(study: &Study<'_>, held: &Held) -> Result<MillingClampMap, Failure> {
+    let plane = &study.job.lobes;
+    let (speeds, depths) = places(study, plane.speeds.min(CLAMP_MAP_SPEEDS), plane.depths.min(CLAMP_MAP_DEPTHS));
+    let still: Vec<[Option<f64>; 2]> =
+        depths.par_iter().map(|&depth_mm| study.static_clamp_n(held, depth_mm)).collect::<Result<_, Failure>>()?;
+    let all: Vec<(usize, f64)> = (0..depths.len()).flat_map(|row| speeds.iter().map(move |&rpm| (row, rpm))).collect();
+    let at = |&(row, spindle_rpm): &(usize, f64)| -> Result<Option<f64>, Failure> {
+        let Ok(rotation) = rotation_at(study, spindle_rpm) else { return Ok(None) };
+        let cut = Cut { rotation, depth_mm: depths[row], ..study.cut() };
+        let chatters = study.orders.on_map(&cut, study.monitor)?.is_none_or(|found| found.modulus() >= 1.0);
+        match (chatters, yields(&cut)) {
+            (true, _) => Ok(None),
+            // What does not yield carries the static force.
+            (false, false) => Ok(still[row][0]),
+            (false, true) => Ok(study.clamp_asked_n(held, &cut)?.map(|force| force.max(0.0))),
+        }
+    };
+    let mut clamp_force_n = Vec::with_capacity(all.len());
+    for chunk in all.chunks(PER_LOOK) {
+        checkpoint(study.monitor)?;
+        clamp_force_n.extend(chunk.par_iter().map(at).collect::<Result<Vec<_>, Failure>>()?);
+    }
+    let [static_n, mean_n] = [0, 1].map(|which| still.iter().map(|both| both[which]).collect());
+    Ok(MillingClampMap { spindle_speed_rpm: speeds, depth_mm: depths, clamp_force_n, static_n, mean_n })
 }
 
 fn map(study: &Study<'_>) -> Result<MillingMap, Failure> {
-    let (from_rpm, to_rpm) = range_rpm(study.job, study.case.rotation.spindle_rpm);
     let plane = &study.job.lobes;
-    let speed = |k: u32| from_rpm + (to_rpm - from_rpm) * f64::from(k) / f64::from(plane.speeds - 1);
-    let speeds: Vec<f64> = (0..plane.speeds).map(speed).collect();
-    let depths: Vec<f64> =
-        (1..=plane.depths).map(|k| study.examined_mm * f64::from(k) / f64::from(plane.depths)).collect();
+    let (speeds, depths) = places(study, plane.speeds, plane.depths);
     let mut columns: Vec<Vec<Option<f64>>> = Vec::with_capacity(speeds.len());
     for chunk in speeds.chunks(PER_LOOK) {
         checkpoint(study.monitor)?;

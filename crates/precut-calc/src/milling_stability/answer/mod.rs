@@ -4,7 +4,7 @@ pub(super) mod advice;
 mod clamping;
 pub(super) mod conformance;
 mod growth;
-mod lobes;
+pub(super) mod lobes;
 mod measured;
 pub(super) mod output;
 pub(super) mod picture;
@@ -73,7 +73,7 @@ pub(super) struct Aside {
     pub slow_hz: Option<f64>,
     /// No periodic motion was found.
     pub no_motion: bool,
-    /// Swing of the forced motion of a cutter with run-out, mm.
+    /// Swing of the forced motion of a cutter with run-out whose chips are taken undisturbed, mm.
     pub beside_run_out_mm: Option<f64>,
     /// Along or about which axis nothing holds the workpiece against the cut.
     pub free: Option<&'static str>,
@@ -159,7 +159,9 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let mut aside = Aside::default();
     monitor.progress(0.02, Message::new("stage_multiplier"));
     let force = forces_of(study, &case.milling, case.depth_mm)?;
-    let multiplier = if job.asks(Asked::Verdict) { multiplier(study)? } else { None };
+    let about_asked = job.asks(Asked::Verdict) || job.asks(Asked::Motion);
+    let about = if about_asked { study.orders.about(&study.cut(), monitor)? } else { None };
+    let multiplier = if job.asks(Asked::Verdict) { multiplier(study, about.as_ref())? } else { None };
     monitor.progress(0.1, Message::new("stage_intervals"));
     let intervals_asked = job.asks(Asked::Intervals);
     let seen = if intervals_asked && !study.is_slow { Some(scan_of(study, &study.cut(), false)?) } else { None };
@@ -169,8 +171,8 @@ pub(super) fn outcome(study: &Study<'_>, estimate_ms: f64) -> Result<(Outcome, A
     let limited_by = if intervals_asked { rigid::limits(study)? } else { None };
     let other_assumptions = if intervals_asked { other_assumptions(study)? } else { OtherAssumptions::default() };
     monitor.progress(0.4, Message::new("stage_motion"));
-    let motion = if job.asks(Asked::Motion) { motion(study, &mut aside)? } else { None };
-    if case.milling.has_run_out() && job.asks_stability() && !study.is_slow {
+    let motion = if job.asks(Asked::Motion) { motion(study, about.as_ref(), &mut aside)? } else { None };
+    if case.milling.has_run_out() && job.asks_stability() && !study.is_slow && about.is_none() {
         aside.beside_run_out_mm = swing_mm(study)?;
     }
     monitor.progress(0.45, Message::new("stage_clamping"));
@@ -436,8 +438,9 @@ enum NoMotion {
 }
 
 /// The forced motion; none where there is no periodic one, or it goes beyond the model.
-fn motion(study: &Study<'_>, aside: &mut Aside) -> Result<Option<MillingMotion>, Failure> {
-    Ok(match motion_of(study, &study.cut())? {
+fn motion(study: &Study<'_>, about: Option<&Milling>, aside: &mut Aside) -> Result<Option<MillingMotion>, Failure> {
+    let cut = about.map_or(study.cut(), |milling| Cut { milling, ..study.cut() });
+    Ok(match motion_of(study, &cut)? {
         Ok(motion) => Some(motion),
         Err(NoMotion::None) => {
             aside.no_motion = true;

@@ -261,6 +261,9 @@ pub struct LeadingMultiplier {
     /// Estimated error of the modulus: two orders compared, and what the eigenpair leaves.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub modulus_error: f64,
+    /// The modulus about undisturbed chips, where teeth stand out and that above is about the motion that the chips force; else null.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub smooth_chips_modulus: Option<f64>,
     /// Frequency of the largest share; null where so many oscillations fit into a period that they lie side by side.
     #[schema(extensions(("x-unit" = json!("Hz"))))]
     pub chatter_frequency_hz: Option<f64>,
@@ -797,6 +800,8 @@ pub struct MillingLobes {
     pub intervals: LobeIntervals,
     /// The multiplier over the plane, where it is asked for.
     pub map: Option<MillingMap>,
+    /// The clamp force over the plane, where it is asked for with the map and the analysis `clamping`.
+    pub clamp_map: Option<MillingClampMap>,
     /// How deep was looked.
     #[schema(extensions(("x-unit" = json!("mm"))))]
     pub examined_to_mm: f64,
@@ -872,6 +877,26 @@ pub struct MillingMap {
     /// Modulus from tooth to tooth, row by row; null where a speed is not answered.
     #[schema(extensions(("x-unit" = json!("1"))))]
     pub per_tooth: Vec<Option<f64>>,
+}
+
+/// The least clamp force by which no contact slips or opens at the lowest friction, over speed and depth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MillingClampMap {
+    /// Columns.
+    #[schema(extensions(("x-unit" = json!("rev/min"))))]
+    pub spindle_speed_rpm: Vec<f64>,
+    /// Rows.
+    #[schema(extensions(("x-unit" = json!("mm"))))]
+    pub depth_mm: Vec<f64>,
+    /// In the forced motion, row by row; null where the cut chatters, the speed is not answered or no clamp force holds.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub clamp_force_n: Vec<Option<f64>>,
+    /// Against the largest static force of each row, at any speed; null where no clamp force holds.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub static_n: Vec<Option<f64>>,
+    /// Against the mean force of each row, at any speed; null where no clamp force holds.
+    #[schema(extensions(("x-unit" = json!("N"))))]
+    pub mean_n: Vec<Option<f64>>,
 }
 
 /// A speed and depth that keep all limits.

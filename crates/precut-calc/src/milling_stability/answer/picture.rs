@@ -7,16 +7,18 @@ use crate::certainty::picture as doubt;
 
 use super::super::job::{Job, PartClamping};
 use super::output::{
-    ForceOfSide, LobeIntervals, MillingBoundary, MillingLobes, MillingMap, Outcome, SpeedCurve, SpeedPocket, WallSide,
+    ForceOfSide, LobeIntervals, MillingBoundary, MillingClampMap, MillingLobes, MillingMap, Outcome, SpeedCurve,
+    SpeedPocket, WallSide,
 };
 
 pub(in crate::milling_stability) const FIGURE_IDS: &[&str] =
-    &["lobes", "speeds", "depth_line", "surface", "clamping", doubt::ID];
+    &["lobes", "clamp_map", "speeds", "depth_line", "surface", "clamping", doubt::ID];
 pub(in crate::milling_stability) const TABLE_IDS: &[&str] = &[
     "lobes",
     "intervals",
     "lobe_intervals",
     "map",
+    "clamp_map",
     "speeds",
     "speed_curve",
     "modes",
@@ -75,6 +77,7 @@ pub(in crate::milling_stability) const LABEL_CODES: &[&str] = &[
     "certain_slip_below",
     "milling_clamping",
     "milling_lobes",
+    "milling_clamp_map",
     "milling_depth_line",
     "milling_surface",
 ];
@@ -101,6 +104,7 @@ pub(in crate::milling_stability) fn figures(job: &Job, outcome: &Outcome) -> Vec
         let items = lobes(job, outcome, diagram);
         figures.push(figure("lobes", "milling_lobes", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }]));
     }
+    figures.extend(outcome.lobes.as_ref().and_then(|diagram| clamp_map(job, diagram)));
     figures.extend(speeds(job, outcome));
     figures.extend(depth_line(job, outcome));
     figures.extend(surface(job, outcome));
@@ -190,6 +194,38 @@ fn heat(map: &MillingMap) -> Item {
         y: map.depth_mm.clone(),
         values: map.per_tooth.iter().map(|value| value.filter(|value| *value > 0.0)).collect(),
         diverging: true,
+    }
+}
+
+/// The clamp force over the plane, where chatter begins, and the depth at which the force at hand gives out.
+fn clamp_map(job: &Job, diagram: &MillingLobes) -> Option<Figure> {
+    let map = diagram.clamp_map.as_ref()?;
+    let MillingBoundary { spindle_speed_rpm, chatter_mm, .. } = &diagram.boundary;
+    let mut items = vec![Item::HeatMap {
+        value: Axis::linear("clamp_force", "N"),
+        x: map.spindle_speed_rpm.clone(),
+        y: map.depth_mm.clone(),
+        values: map.clamp_force_n.clone(),
+        diverging: false,
+    }];
+    items.push(line("chatter_limit", spindle_speed_rpm, chatter_mm.clone(), Role::Limit));
+    if let Some((force, _)) = job.clamping.as_ref().and_then(PartClamping::clamp_force) {
+        let given_out = (0..map.spindle_speed_rpm.len()).map(|column| map.gives_out_mm(column, force)).collect();
+        items.push(line("clamp_force_at_hand", &map.spindle_speed_rpm, given_out, Role::Command));
+    }
+    Some(figure("clamp_map", "milling_clamp_map", SPEED, vec![Panel { y: DEPTH, height: 1.0, items }]))
+}
+
+impl MillingClampMap {
+    /// The depth of a column at which a clamp force gives out, straight between rows; `None` where it does not.
+    fn gives_out_mm(&self, column: usize, force_n: f64) -> Option<f64> {
+        let asked = |row: usize| self.clamp_force_n[row * self.spindle_speed_rpm.len() + column];
+        let above = (0..self.depth_mm.len()).find(|&row| asked(row).is_some_and(|asked| asked > force_n))?;
+        // Without a cut nothing is asked.
+        let (depth, held) =
+            above.checked_sub(1).map_or(Some((0.0, 0.0)), |row| Some((self.depth_mm[row], asked(row)?)))?;
+        let share = (force_n - held) / (asked(above)? - held);
+        Some(depth + share * (self.depth_mm[above] - depth))
     }
 }
 
@@ -319,6 +355,7 @@ pub(in crate::milling_stability) fn tables(outcome: &Outcome) -> Vec<Table> {
             ],
         },
         map(lobes.and_then(|lobes| lobes.map.as_ref())),
+        clamp_table(lobes.and_then(|lobes| lobes.clamp_map.as_ref())),
         speed_table(outcome),
         curve_table(outcome.speed_curve.as_ref()),
         modes(outcome),
@@ -367,6 +404,29 @@ fn map(map: Option<&MillingMap>) -> Table {
             Column::numbers("spindle_speed", "rev/min", &speed),
             Column::numbers("depth", "mm", &depth),
             Column::optional("per_tooth", "1", &modulus),
+        ],
+    }
+}
+
+/// One row per place of the map of the clamp force.
+fn clamp_table(map: Option<&MillingClampMap>) -> Table {
+    let columns = map.map_or(0, |map| map.spindle_speed_rpm.len());
+    let rows: Vec<([f64; 2], [Option<f64>; 3])> = map
+        .iter()
+        .flat_map(|map| map.clamp_force_n.iter().enumerate().map(move |(k, force)| (map, k, force)))
+        .map(|(map, k, force)| {
+            let (row, column) = (k / columns, k % columns);
+            ([map.spindle_speed_rpm[column], map.depth_mm[row]], [*force, map.static_n[row], map.mean_n[row]])
+        })
+        .collect();
+    Table {
+        id: "clamp_map",
+        columns: vec![
+            numbers("spindle_speed", "rev/min", &rows, |row| Some(row.0[0])),
+            numbers("depth", "mm", &rows, |row| Some(row.0[1])),
+            numbers("clamp_force", "N", &rows, |row| row.1[0]),
+            numbers("static_clamp_force", "N", &rows, |row| row.1[1]),
+            numbers("mean_clamp_force", "N", &rows, |row| row.1[2]),
         ],
     }
 }

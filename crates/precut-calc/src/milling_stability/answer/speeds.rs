@@ -282,6 +282,13 @@ fn tried(study: &Study<'_>, spindle_rpm: f64, depth: Depth) -> Result<Option<Spe
     if found.modulus() + error >= 1.0 {
         return Ok(None);
     }
+    // Where teeth stand out, about the motion that their chips force, too.
+    if let Some(milling) = study.orders.about(&cut, study.monitor)? {
+        let found = study.orders.with_error(&Cut { milling: &milling, ..cut }, study.monitor)?;
+        if found.is_none_or(|(found, error)| found.modulus() + error >= 1.0) {
+            return Ok(None);
+        }
+    }
     let torque = statics(&study.case.milling, printed, study.monitor)?.torque_mean_n_mm / N_MM_PER_N_M;
     let efficiency = study.job.spindle.as_ref().map_or(1.0, |spindle| spindle.efficiency);
     let left = left(study, rotation, printed)?;

@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 
 use crate::fixture_stability::{Vise, engagement_rad};
 
-use super::super::model::{Cut as ModelCut, Law, Milling, Mode, Rotation, Rubbing, Side, Structure, Tooth, Vector};
+use super::super::model::{
+    About, Cut as ModelCut, Law, Milling, Mode, Rotation, Rubbing, Side, Structure, Tooth, Vector,
+};
 use super::input::{
-    Cut, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, Milling as Sense, Yielding, YieldingMode,
+    ChipsAbout, Cut, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, Milling as Sense, Yielding, YieldingMode,
 };
 
 /// Modulations of the speed in a period of the map at most.
@@ -155,6 +157,10 @@ pub(super) fn milling(job: &Job) -> Option<Milling> {
         rubbing: match &job.process_damping {
             Some(rubbing) => Some(Rubbing { coefficient_n_per_mm: coefficient(rubbing)?, friction: rubbing.friction }),
             None => None,
+        },
+        about: match job.about {
+            ChipsAbout::ForcedMotion => About::ForcedMotion,
+            ChipsAbout::SmoothChips => About::SmoothChips,
         },
     })
 }

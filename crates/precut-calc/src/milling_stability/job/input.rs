@@ -50,6 +50,10 @@ pub struct Job {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(extensions(("x-group" = json!("machine")), ("x-advanced" = json!(true))))]
     pub speed_variation: Option<SpeedVariation>,
+    /// What chips, and the surfaces that teeth meet, are taken about where teeth stand out.
+    #[serde(default)]
+    #[schema(default = json!("forced_motion"), example = "forced_motion", extensions(("x-group" = json!("numerics")), ("x-advanced" = json!(true))))]
+    pub about: ChipsAbout,
     /// What is uncertain in it, and which probability is wanted; acts with the analysis `certainty`.
     #[serde(default)]
     #[schema(extensions(("x-group" = json!("cut"))))]
@@ -359,6 +363,17 @@ impl Milling {
     pub(in crate::milling_stability) fn is_at_a_side(self) -> bool {
         self != Self::Centred
     }
+}
+
+/// What chips are taken about.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChipsAbout {
+    /// The motion that the chips force: which surface a tooth meets depends on it.
+    #[default]
+    ForcedMotion,
+    /// Undisturbed chips.
+    SmoothChips,
 }
 
 /// What yields of one side.

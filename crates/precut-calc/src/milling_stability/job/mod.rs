@@ -14,9 +14,9 @@ pub(super) use check::{CODES, modes, too_expensive, way};
 pub(super) use held::Held;
 pub use held::{Coordinate, CutStation, GrippingContacts, GrippingPoint, GrippingVise, PartClamping};
 pub use input::{
-    Asked, Cut, CutLimits, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce, LobePlane,
-    MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation, ToothHelix,
-    ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
+    Asked, ChipsAbout, Cut, CutLimits, CutWidth, Cutter, DirectionPart, EdgeForce, FlankRubbing, Job, KienzleForce,
+    LobePlane, MechanisticForce, MillSpindle, Milling, NothingYields, PowerForce, RubbingSource, SpeedVariation,
+    ToothHelix, ToothOffset, ToothPitch, Yielding, YieldingMode, YieldingModes, YieldingReceptances, YieldingVise,
 };
 pub(super) use measured::{Fit, fits, guessed};
 pub(super) use uncertain::{Drawn, OneQuantity, clamped, drawn, uncertainties};

@@ -261,7 +261,17 @@ impl Diagnosable for MillingStability {
         ranges: Ranges<'_>,
         monitor: &dyn Monitor,
     ) -> Result<NextRuns<MillingRun, MillingPoint>, Failure> {
-        next_runs(job, rows, ranges, monitor)
+        next_runs(job, rows, ranges, &[], monitor)
+    }
+
+    fn next_runs_between(
+        job: &Job,
+        rows: &Rows<MillingRun, MillingPoint>,
+        ranges: Ranges<'_>,
+        likely: &[Vec<MillingEffect>],
+        monitor: &dyn Monitor,
+    ) -> Result<NextRuns<MillingRun, MillingPoint>, Failure> {
+        next_runs(job, rows, ranges, likely, monitor)
     }
 
     fn outlooks(

@@ -1,6 +1,7 @@
 //! The cutter in its cut: teeth with their own pitch, helix and run-out, and the force of an edge.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// A vector in the axes of the cut: x along the feed, y across it, z along the spindle.
 pub type Vector = [f64; 3];
@@ -94,6 +95,57 @@ pub struct Rubbing {
     pub friction: f64,
 }
 
+/// What chips, and the surfaces that they meet, are taken about (`milling/2.2`).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum About {
+    /// Undisturbed chips.
+    #[default]
+    SmoothChips,
+    /// Where teeth stand out the motion that the chips force, which has to be found first: without run-out each meets the surface of the
+    /// tooth before it, but for the shallowest chips.
+    ForcedMotion,
+    /// This motion.
+    Known(Turn),
+}
+
+/// A motion of the tool against the work that repeats itself from turn to turn: at even rotations, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Turn(Arc<[Vector]>);
+
+impl Turn {
+    /// At even rotations from that on at which the first tooth stands at +y; four at least.
+    pub fn new(at: Vec<Vector>) -> Self {
+        Self(at.into())
+    }
+
+    /// How many rotations.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// At a rotation, by the cubic through the nearest four.
+    pub fn at(&self, rotation_rad: f64) -> Vector {
+        let count = self.0.len();
+        let place = (rotation_rad / TAU).rem_euclid(1.0) * count as f64;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below the count
+        let k = (place.floor() as usize).min(count - 1);
+        let c = place - place.floor();
+        let weights = [
+            -c * (c - 1.0) * (c - 2.0) / 6.0,
+            (c + 1.0) * (c - 1.0) * (c - 2.0) / 2.0,
+            -(c + 1.0) * c * (c - 2.0) / 2.0,
+            (c + 1.0) * c * (c - 1.0) / 6.0,
+        ];
+        let mut sum = [0.0; 3];
+        for (i, weight) in weights.iter().enumerate() {
+            for (sum, value) in sum.iter_mut().zip(&self.0[(k + count + i - 1) % count]) {
+                *sum += weight * value;
+            }
+        }
+        sum
+    }
+}
+
 /// Cutter, engagement and law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Milling {
@@ -115,6 +167,8 @@ pub struct Milling {
     pub depth_exponent: f64,
     /// Process damping, where there is some.
     pub rubbing: Option<Rubbing>,
+    /// What the chips are taken about.
+    pub about: About,
 }
 
 impl Milling {
@@ -147,12 +201,31 @@ impl Milling {
     /// The chip of a tooth at an angle and a height, and whose surface it meets; `None` where it does not cut.
     pub fn chip(&self, tooth: usize, angle_rad: f64, height_mm: f64) -> Option<(f64, usize)> {
         let sin = angle_rad.sin();
+        let moved = self.motion(tooth, angle_rad, height_mm);
         let against = |l: usize| {
             let (fed, offset) = self.chip_parts(tooth, l, height_mm);
-            (fed * sin + offset, l)
+            (fed * sin + offset + moved.as_ref().map_or(0.0, |moved| moved.thicker_mm(self, tooth, l, height_mm)), l)
         };
-        let last = if self.has_run_out() { self.teeth.len() } else { 1 };
+        let last = if self.meets_any() { self.teeth.len() } else { 1 };
         (1..=last).map(against).min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(chip, _)| *chip > 0.0)
+    }
+
+    /// By how much the motion that the chips are taken about makes that against the tooth l before thicker, mm.
+    pub fn thicker_mm(&self, tooth: usize, l: usize, angle_rad: f64, height_mm: f64) -> f64 {
+        self.motion(tooth, angle_rad, height_mm).map_or(0.0, |moved| moved.thicker_mm(self, tooth, l, height_mm))
+    }
+
+    /// The motion that is known, as an edge meets it.
+    fn motion(&self, tooth: usize, angle_rad: f64, height_mm: f64) -> Option<Met<'_>> {
+        let About::Known(turn) = &self.about else { return None };
+        let rotation_rad = angle_rad + self.behind_rad(tooth) + self.teeth[tooth].lag_rad_per_mm * height_mm;
+        let normal = self.normal(angle_rad);
+        Some(Met { turn, rotation_rad, now_mm: along(&normal, &turn.at(rotation_rad)), normal })
+    }
+
+    /// Whether a tooth may meet the surface of any other.
+    pub fn meets_any(&self) -> bool {
+        self.has_run_out() || matches!(self.about, About::Known(_))
     }
 
     /// Whether any tooth stands out.
@@ -225,6 +298,25 @@ impl Milling {
             [sin * lifting * is, sin * lifting * ic, -cos * lifting * angle_rad],
         ]
     }
+}
+
+/// A known motion where an edge stands at a rotation.
+struct Met<'a> {
+    turn: &'a Turn,
+    rotation_rad: f64,
+    normal: Vector,
+    /// Along the normal, mm.
+    now_mm: f64,
+}
+
+impl Met<'_> {
+    fn thicker_mm(&self, milling: &Milling, tooth: usize, l: usize, height_mm: f64) -> f64 {
+        self.now_mm - along(&self.normal, &self.turn.at(self.rotation_rad - milling.turned_rad(tooth, l, height_mm)))
+    }
+}
+
+fn along(normal: &Vector, motion: &Vector) -> f64 {
+    normal.iter().zip(motion).map(|(n, r)| n * r).sum()
 }
 
 /// Normal of an edge from the sines and cosines of its angle and of kappa.

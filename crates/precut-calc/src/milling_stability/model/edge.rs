@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::num::quadrature::gauss_legendre;
 
-use super::cutter::{Milling, Rubbing, Tensor, Vector};
+use super::cutter::{About, Law, Milling, Rubbing, Tensor, Vector};
 
 /// From one break to the next the chip grows by so much at most where its power is to be a polynomial.
 const GROWTH: f64 = 2.0;
@@ -28,6 +28,10 @@ pub struct Engagement {
     /// Process damping times the cutting speed, N/mm s mm/s.
     pub rubbing: Tensor,
 }
+
+/// Samples of a motion between two angles at which the form of a chip is compared; a break is found to so much.
+const SAMPLES_A_STEP: f64 = 4.0;
+const BESIDE_RAD: f64 = 1e-11;
 
 /// A stretch of an edge on which one surface is met.
 struct Piece {
@@ -81,7 +85,7 @@ impl<'a> Edges<'a> {
     /// one stands out.
     pub(super) fn work(&self) -> usize {
         const PER_CHIP: usize = 40;
-        let against = if self.milling.has_run_out() { self.milling.teeth.len() } else { 1 };
+        let against = if self.milling.meets_any() { self.milling.teeth.len() } else { 1 };
         PER_CHIP * against * self.breaks.iter().map(Vec::len).sum::<usize>()
     }
 
@@ -170,9 +174,10 @@ impl<'a> Edges<'a> {
     pub fn at(&self, rotation_rad: f64) -> Engagement {
         let mut sums = Engagement::default();
         let factor = self.milling.depth_factor(self.depth_mm);
+        let about_motion = matches!(self.milling.about, About::Known(_));
         for tooth in 0..self.milling.teeth.len() {
             let lag = self.milling.teeth[tooth].lag_rad_per_mm;
-            if lag.abs() > 0.0 && self.one_helix && !self.milling.law.bends() {
+            if lag.abs() > 0.0 && self.one_helix && !self.milling.law.bends() && !about_motion {
                 let slope = self.milling.law.slope(1.0);
                 self.pieces(tooth, rotation_rad - self.behind[tooth], |piece, _| {
                     let over = |slope: &Vector| {
@@ -189,8 +194,10 @@ impl<'a> Edges<'a> {
                 continue;
             }
             self.points(tooth, rotation_rad, |angle, height, share, l| {
-                let Some((chip, _)) = self.milling.chip(tooth, angle, height) else { return };
+                let Some((chip, met)) = self.milling.chip(tooth, angle, height) else { return };
                 let slope = self.milling.law.slope(chip);
+                // About a motion another surface may be met inside a piece.
+                let l = if about_motion { met } else { l };
                 let turned = self.milling.turned_rad(tooth, l, height);
                 sums.add(turned, &self.milling.stiffness(angle, &slope), share * factor);
                 if let Some(rubbing) = self.milling.rubbing {
@@ -202,14 +209,30 @@ impl<'a> Edges<'a> {
         sums
     }
 
-    /// Force on the tool, N, and torque against the spindle, N mm, with undisturbed chips (`milling/2.9`).
+    /// Force on the tool, N, and torque against the spindle, N mm (`milling/2.9`).
     pub fn force(&self, rotation_rad: f64) -> (Vector, f64) {
+        self.summed(rotation_rad, |chip, _| self.milling.law.force(chip))
+    }
+
+    /// The force on the tool that drives its motion, N: that of the chips, less what their slope makes of the motion that they are taken
+    /// about.
+    pub(super) fn driving(&self, rotation_rad: f64) -> Vector {
+        let law = &self.milling.law;
+        let linear = |chip: f64, thicker: f64| -> Vector {
+            let (force, slope) = (law.force(chip), law.slope(chip));
+            std::array::from_fn(|q| force[q] - slope[q] * thicker)
+        };
+        self.summed(rotation_rad, linear).0
+    }
+
+    /// Force and torque of what a chip, and how much of it is motion, makes per mm of edge.
+    fn summed(&self, rotation_rad: f64, per_edge: impl Fn(f64, f64) -> Vector) -> (Vector, f64) {
         let (mut force, mut torque) = ([0.0; 3], 0.0);
         let factor = self.milling.depth_factor(self.depth_mm);
         for tooth in 0..self.milling.teeth.len() {
             self.points(tooth, rotation_rad, |angle, height, share, _| {
-                let Some((chip, _)) = self.milling.chip(tooth, angle, height) else { return };
-                let per_edge = self.milling.law.force(chip);
+                let Some((chip, l)) = self.milling.chip(tooth, angle, height) else { return };
+                let per_edge = per_edge(chip, self.milling.thicker_mm(tooth, l, angle, height));
                 let one = self.milling.on_tool(angle, &per_edge);
                 for (sum, part) in force.iter_mut().zip(one) {
                     *sum += part * share * factor;
@@ -245,10 +268,58 @@ pub(super) fn combined(x: &Tensor, a: f64, y: &Tensor, b: f64) -> Tensor {
     std::array::from_fn(|i| std::array::from_fn(|j| a * x[i][j] + b * y[i][j]))
 }
 
-/// Angles of a tooth at which its chip changes its form: entry, exit, another surface met, no chip, floor and its multiples.
+/// Angles of a tooth at which its chip changes its form: entry, exit, another surface met, no chip, floor and its multiples. Edges in a
+/// helix have those of tip and top.
 fn breaks(milling: &Milling, tooth: usize, depth_mm: f64) -> Vec<f64> {
+    let mut found = match &milling.about {
+        About::Known(turn) => breaks_about(milling, turn.count(), tooth, depth_mm),
+        About::SmoothChips | About::ForcedMotion => breaks_of_smooth_chips(milling, tooth, depth_mm),
+    };
+    found.extend([milling.entry_rad, milling.exit_rad]);
+    found.sort_by(f64::total_cmp);
+    found.dedup_by(|a, b| (*a - *b).abs() < 1e-10);
+    found
+}
+
+/// About a motion: found between neighbours of angles that follow it.
+fn breaks_about(milling: &Milling, samples: usize, tooth: usize, depth_mm: f64) -> Vec<f64> {
     let (entry, exit) = (milling.entry_rad, milling.exit_rad);
-    let mut found = vec![entry, exit];
+    // The surface met, and between which multiples of the floor the chip lies.
+    let form = |angle: f64, height: f64| {
+        milling.chip(tooth, angle, height).map(|(chip, l)| match milling.law {
+            Law::Power { floor_mm, .. } if milling.law.bends() && floor_mm > 0.0 => {
+                (l, (chip / floor_mm).max(0.5).log2().floor())
+            }
+            _ => (l, 0.0),
+        })
+    };
+    let is_straight = milling.teeth[tooth].lag_rad_per_mm.abs() <= 0.0 && milling.has_one_helix();
+    let heights: &[f64] = if is_straight { &[0.0] } else { &[0.0, depth_mm] };
+    let step = TAU * SAMPLES_A_STEP / samples as f64;
+    let mut found = Vec::new();
+    for &height in heights {
+        let mut from = (entry, form(entry + BESIDE_RAD, height));
+        while from.0 < exit {
+            let angle = (from.0 + step).min(exit);
+            let to = (angle, form(angle.min(exit - BESIDE_RAD), height));
+            if to.1 != from.1 {
+                let (mut low, mut high) = (from.0, to.0);
+                while high - low > BESIDE_RAD {
+                    let middle = 0.5 * (low + high);
+                    if form(middle, height) == from.1 { low = middle } else { high = middle }
+                }
+                found.push(0.5 * (low + high));
+            }
+            from = to;
+        }
+    }
+    found
+}
+
+/// The same of undisturbed chips, in closed form.
+fn breaks_of_smooth_chips(milling: &Milling, tooth: usize, depth_mm: f64) -> Vec<f64> {
+    let (entry, exit) = (milling.entry_rad, milling.exit_rad);
+    let mut found = Vec::new();
     let mut at_sine = |sine: f64| {
         if (0.0..=1.0).contains(&sine) {
             for angle in [sine.asin(), PI - sine.asin()] {
@@ -270,7 +341,7 @@ fn breaks(milling: &Milling, tooth: usize, depth_mm: f64) -> Vec<f64> {
                     at_sine((offset - further) / (more - fed));
                 }
             }
-            if let super::cutter::Law::Power { floor_mm, .. } = milling.law
+            if let Law::Power { floor_mm, .. } = milling.law
                 && milling.law.bends()
             {
                 let mut chip = if floor_mm > 0.0 { floor_mm } else { 1e-4 * fed };
@@ -281,7 +352,5 @@ fn breaks(milling: &Milling, tooth: usize, depth_mm: f64) -> Vec<f64> {
             }
         }
     }
-    found.sort_by(f64::total_cmp);
-    found.dedup_by(|a, b| (*a - *b).abs() < 1e-10);
     found
 }

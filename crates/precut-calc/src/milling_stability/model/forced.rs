@@ -1,7 +1,8 @@
 //! The motion that the chips force on tool and work, and the surface that it leaves (`milling/4.20`).
 //!
-//! Linear about undisturbed chips. Where all teeth are alike every one repeats it and no wave is left: modes under a known
-//! force. Else what earlier teeth left acts as well, and the motion is the fixed point of an affine map over a turn.
+//! Where all teeth are alike every one repeats it and no wave is left: modes under a known force. Else what earlier teeth left acts as
+//! well, and the motion is the fixed point of an affine map over a turn: linear about undisturbed chips, or about the motion itself, which
+//! is found by rounds of that.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +10,7 @@ use crate::calculator::{Failure, Monitor, Pace};
 use crate::num::dde::Rule;
 use crate::num::gmres::gmres;
 
-use super::cutter::Vector;
+use super::cutter::{About, Milling, Turn, Vector};
 use super::map::{Acting, Cut, Map};
 use super::multiplier::POINTS;
 use super::structure::Side;
@@ -21,6 +22,16 @@ const ACCEPTED: f64 = 1e-7;
 const APPLICATIONS: usize = 400;
 /// Samples of an element between two ends.
 const SAMPLES: u32 = 24;
+/// Rounds in which a motion is looked for about itself, what it may change at last as a share of its size, and how much of the change before
+/// a round may make; the least part of a step that is gone.
+const ROUNDS: usize = 16;
+const SETTLED: f64 = 1e-7;
+const SLOWLY: f64 = 0.7;
+const LEAST_SHARE: f64 = 0.125;
+/// Samples of a motion for each oscillation of the fastest mode, and at least and at most in a turn.
+const PER_OSCILLATION: f64 = 48.0;
+const FEWEST: f64 = 720.0;
+const MOST: f64 = 40_000.0;
 /// Samples of the profile of a wall over a feed per turn.
 const PROFILE: u32 = 2000;
 /// An angle this near to 0 or pi is a tooth that leaves a wall.
@@ -56,6 +67,64 @@ pub struct Forced<'a> {
     pressed: Vec<Vec<f64>>,
 }
 
+/// The cutter with its chips taken about the motion that they force; `None` where that is not asked for, changes nothing, or is not found.
+///
+/// Newton's method: with chips and surfaces of the motion before the force is linear in the motion, and of a law that is a straight
+/// line exact but for the angles at which another surface is met. Where a round changes hardly less than the one before, half of it is gone.
+pub(super) fn about_forced(
+    cut: &Cut<'_>,
+    rule: &Rule<POINTS>,
+    monitor: &dyn Monitor,
+) -> Result<Option<Milling>, Failure> {
+    let matters = cut.milling.has_run_out() && !cut.structure.modes.is_empty();
+    if !matches!(cut.milling.about, About::ForcedMotion) || !matters || cut.rotation.varies() {
+        return Ok(None);
+    }
+    let count = samples(cut);
+    let period_s = cut.rotation.period_s(TAU);
+    let mut milling = Milling { about: About::SmoothChips, ..cut.milling.clone() };
+    let mut known: Vec<Vector> = Vec::new();
+    let (mut share, mut before) = (1.0_f64, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let there = Cut { milling: &milling, ..*cut };
+        let Some(periodic) = forced(&there, rule, monitor)? else { return Ok(None) };
+        let found: Vec<Vector> = (0..count).map(|k| periodic.at(period_s * k as f64 / count as f64)).collect();
+        let size = found.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        if !size.is_finite() || size > cut.milling.radius_mm {
+            return Ok(None);
+        }
+        let mut off = f64::INFINITY;
+        if !known.is_empty() {
+            let pairs = found.iter().flatten().zip(known.iter().flatten());
+            off = pairs.fold(0.0, |most: f64, (x, y)| most.max((x - y).abs())) / size.max(f64::MIN_POSITIVE);
+            if off > SLOWLY * before {
+                share = (0.5 * share).max(LEAST_SHARE);
+            }
+        }
+        before = off;
+        known = if known.is_empty() {
+            found
+        } else {
+            let step = |(x, y): (&Vector, &Vector)| std::array::from_fn(|q| y[q] + share * (x[q] - y[q]));
+            found.iter().zip(&known).map(step).collect()
+        };
+        milling.about = About::Known(Turn::new(known.clone()));
+        if off < SETTLED {
+            return Ok(Some(milling));
+        }
+    }
+    Ok(None)
+}
+
+/// Rotations at which a motion is known.
+fn samples(cut: &Cut<'_>) -> usize {
+    let oscillations = cut.structure.fastest_rad_per_s() * cut.rotation.period_s(TAU) / TAU;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between both
+    let count = (PER_OSCILLATION * oscillations).clamp(FEWEST, MOST).ceil() as usize;
+    count
+}
+
+/// The periodic motion, linear about what the chips of the cut are taken about.
 pub(super) fn forced<'a>(
     cut: &'a Cut<'a>,
     rule: &'a Rule<POINTS>,

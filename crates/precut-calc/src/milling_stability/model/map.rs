@@ -376,7 +376,7 @@ impl<const P: usize> Assembly<'_, P> {
             let rotation_rad = self.cut.rotation.rotation_rad(time);
             let instant = self.edges.at(rotation_rad);
             if is_driven {
-                let (force, _) = self.edges.force(rotation_rad);
+                let force = self.edges.driving(rotation_rad);
                 chips.extend(self.cut.structure.basis.iter().map(|b| dot(b, &force)));
             }
             for entry in instant.entries.iter().filter(|_| self.acting != Acting::Force) {
@@ -482,7 +482,7 @@ fn add_transposed(y: &mut [f64], matrix: &DMatrix<f64>, x: &[f64]) {
 mod tests {
     use super::*;
     use crate::calculator::Unwatched;
-    use crate::milling_stability::model::{Law, Mode, Side, Tooth};
+    use crate::milling_stability::model::{About, Law, Mode, Side, Tooth};
 
     /// y' (M x) = (M' y)' x for any x and y, where delays meet this period and the one before.
     #[test]
@@ -498,6 +498,7 @@ mod tests {
             law: Law::Mechanistic { edge: [0.0; 3], cutting: [900.0, 400.0, 200.0] },
             depth_exponent: 0.0,
             rubbing: None,
+            about: About::SmoothChips,
         };
         let mode = |direction, frequency_hz| Mode {
             side: Side::Tool,

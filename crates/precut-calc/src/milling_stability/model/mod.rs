@@ -18,7 +18,7 @@ mod structure;
 mod zeroth;
 
 pub use carried::{Carried, Instant, Sampling};
-pub use cutter::{Law, Milling, Rubbing, Tensor, Tooth, Vector};
+pub use cutter::{About, Law, Milling, Rubbing, Tensor, Tooth, Turn, Vector};
 pub use direct::{Direct, DirectLimit, MeasuredPair, NotDirect};
 pub use edge::{Edges, Engagement, Entry};
 pub use forced::{Forced, Roughness, Wall};

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use crate::calculator::{Failure, Monitor, Pace};
-use crate::num::dde::SlowPeriod;
+use crate::num::dde::{SLOW_PHASES, SlowPeriod};
 use crate::num::roots::aberth;
 
 use super::cutter::Tensor;
@@ -27,8 +27,11 @@ const LEAST_DECAYS: f64 = 20.0;
 /// Of several modes the shape of the disturbance turns on its way through the arc, which the form leaves out. That does not fade with
 /// the time from tooth to tooth; against elements it changed the modulus by up to a tenth.
 const SHAPES: f64 = 0.15;
-/// Longest stretch of the finer places, as a share of arc and period.
+/// Longest stretch and phases of the multiplier that are looked at usually; of the finer look that tells the error the stretch as a share
+/// of arc and period.
+const USUAL: (f64, usize) = (f64::INFINITY, SLOW_PHASES);
 const FINER: f64 = 0.4;
+const FINER_PHASES: usize = 2 * SLOW_PHASES + 1;
 /// Starts lie so far beside the free roots, as a share of them.
 const BESIDE: f64 = 0.02;
 /// Multiplications of a mode at a trial of a root.
@@ -55,6 +58,7 @@ struct SlowCut<'a, const D: usize> {
     /// Stiffness of the chips, N/mm; `None` where nothing is cut.
     places: Vec<Option<[[f64; D]; D]>>,
     shares_s: Vec<f64>,
+    phases: usize,
     scale_rad_per_s: f64,
     /// Roots without coupling, over the scale.
     free: Vec<Complex<f64>>,
@@ -87,7 +91,7 @@ pub struct SlowMultiplier {
 
 impl<'a, const D: usize> SlowCut<'a, D> {
     /// Sixteen places to a stretch between breaks, none longer than told.
-    fn new(cut: Cut<'a>, longest_rad: f64) -> Self {
+    fn new(cut: Cut<'a>, (longest_rad, phases): (f64, usize)) -> Self {
         let structure = cut.structure;
         let period_s = cut.rotation.period_s(cut.milling.period_rad());
         let scale_rad_per_s = structure.fastest_rad_per_s();
@@ -115,7 +119,7 @@ impl<'a, const D: usize> SlowCut<'a, D> {
         };
         let free: Vec<Complex<f64>> = structure.modes.iter().flat_map(pair).collect();
         let roots = RefCell::new(vec![free.clone(); places.len()]);
-        Self { cut, modes, places, shares_s, scale_rad_per_s, free, roots }
+        Self { cut, modes, places, shares_s, phases, scale_rad_per_s, free, roots }
     }
 
     /// The root with the largest real part at a place, 1/s.
@@ -175,7 +179,7 @@ impl<'a, const D: usize> SlowCut<'a, D> {
     fn multiplier(&self, monitor: &dyn Monitor) -> Result<SlowMultiplier, Failure> {
         let mut pace = Pace::new(monitor);
         let leading = |place: usize, coupling: Complex<f64>| self.leading(place, coupling);
-        let period = SlowPeriod { shares_s: &self.shares_s, leading: &leading };
+        let period = SlowPeriod { shares_s: &self.shares_s, phases: self.phases, leading: &leading };
         let found = period.multiplier(|| pace.work(self.work()))?;
         let modulus = found.ln_modulus.min(FAR).exp();
         let (re, im) = (modulus * found.angle_rad.cos(), modulus * found.angle_rad.sin());
@@ -193,7 +197,7 @@ impl<'a, const D: usize> SlowCut<'a, D> {
     /// See [`slow_margin`].
     fn margin(&self, pace: &mut Pace<'_>) -> Result<(f64, f64), Failure> {
         let leading = |place: usize, coupling: Complex<f64>| self.leading(place, coupling);
-        let period = SlowPeriod { shares_s: &self.shares_s, leading: &leading };
+        let period = SlowPeriod { shares_s: &self.shares_s, phases: self.phases, leading: &leading };
         let at_one = period.at_one(|| pace.work(self.work()))?;
         Ok((at_one.ln_whole.max(at_one.ln_within - GROWN.ln()), at_one.rad_per_s / TAU))
     }
@@ -202,11 +206,11 @@ impl<'a, const D: usize> SlowCut<'a, D> {
 /// The leading multiplier of a slow cut that repeats from tooth to tooth; with twice as many places and more where that is wanted.
 pub(super) fn slow_multiplier(cut: &Cut<'_>, finer: bool, monitor: &dyn Monitor) -> Result<SlowMultiplier, Failure> {
     let arc_rad = (cut.milling.exit_rad - cut.milling.entry_rad).min(cut.milling.period_rad());
-    let longest_rad = if finer { FINER * arc_rad } else { f64::INFINITY };
+    let look = if finer { (FINER * arc_rad, FINER_PHASES) } else { USUAL };
     match cut.structure.basis.len() {
-        1 => SlowCut::<1>::new(*cut, longest_rad).multiplier(monitor),
-        2 => SlowCut::<2>::new(*cut, longest_rad).multiplier(monitor),
-        _ => SlowCut::<3>::new(*cut, longest_rad).multiplier(monitor),
+        1 => SlowCut::<1>::new(*cut, look).multiplier(monitor),
+        2 => SlowCut::<2>::new(*cut, look).multiplier(monitor),
+        _ => SlowCut::<3>::new(*cut, look).multiplier(monitor),
     }
 }
 
@@ -214,9 +218,9 @@ pub(super) fn slow_multiplier(cut: &Cut<'_>, finer: bool, monitor: &dyn Monitor)
 /// two teeth over fifty, whichever is larger; and the frequency, Hz.
 pub(super) fn slow_margin(cut: &Cut<'_>, pace: &mut Pace<'_>) -> Result<(f64, f64), Failure> {
     match cut.structure.basis.len() {
-        1 => SlowCut::<1>::new(*cut, f64::INFINITY).margin(pace),
-        2 => SlowCut::<2>::new(*cut, f64::INFINITY).margin(pace),
-        _ => SlowCut::<3>::new(*cut, f64::INFINITY).margin(pace),
+        1 => SlowCut::<1>::new(*cut, USUAL).margin(pace),
+        2 => SlowCut::<2>::new(*cut, USUAL).margin(pace),
+        _ => SlowCut::<3>::new(*cut, USUAL).margin(pace),
     }
 }
 
