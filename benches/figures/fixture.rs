@@ -97,7 +97,7 @@ pub(crate) fn answer() -> Result<Measured, String> {
 }
 
 /// What an answer takes for the probability of a quiet cut, in a vise with a grip: over the same answer without.
-pub(crate) fn probability(analyses: &[&str]) -> Result<Measured, String> {
+pub(crate) fn probability(analyses: &[&str], check: &str) -> Result<Measured, String> {
     let job = |uncertainty: Value| {
         let joint =
             |stiffness: f64, damping: f64| json!({ "stiffness_n_per_mm": stiffness, "damping_n_s_per_mm": damping });
@@ -114,7 +114,7 @@ pub(crate) fn probability(analyses: &[&str]) -> Result<Measured, String> {
         }))
     };
     let plain = job(json!({ "defaults": false }))?;
-    let with = job(json!({}))?;
+    let with = job(json!({ "check": check }))?;
     let plain = cpu_time(|| FixtureStability::run(&plain, &Unwatched))?;
     let with = cpu_time(|| FixtureStability::run(&with, &Unwatched))?;
     let less = |with: f64| (with - plain.median).max(0.0);

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use precut_calc::calculator::{Calculator, Failure, Unwatched};
-use precut_calc::milling_stability::model::{Cut, Law, Milling, Mode, Orders, Rotation, Side, Structure, Tooth};
+use precut_calc::milling_stability::model::{About, Cut, Law, Milling, Mode, Orders, Rotation, Side, Structure, Tooth};
 use precut_calc::milling_stability::{Job, MillingStability};
 use serde_json::{Value, json};
 
@@ -43,6 +43,7 @@ fn milling(teeth: Teeth) -> Milling {
         law: Law::Mechanistic { edge: [0.0; 3], cutting: [1319.4, 788.8, 0.0] },
         depth_exponent: 0.0,
         rubbing: None,
+        about: About::SmoothChips,
     }
 }
 

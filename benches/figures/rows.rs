@@ -126,14 +126,15 @@ pub(crate) fn all() -> Vec<Row> {
         row("a step of the cut in time, power law", Unit::Time, us(0.04), us(0.0167), || fixture::step(0.1)),
         row("complete fixture answer: verdict", Unit::Time, None, None, fixture::answer),
         row("of a fixture answer its probability: stable, closed and held", Unit::Time, us(50_000.0), None, || {
-            fixture::probability(&[])
+            fixture::probability(&[], "auto")
         }),
+        row("the same, the vise itself asked", Unit::Time, None, None, || fixture::probability(&[], "always")),
         row(
             "and depths of a probability over 200 speeds, with a robust one",
             Unit::Time,
             us(500_000.0),
             us(150_000.0),
-            || fixture::probability(&["certainty"]),
+            || fixture::probability(&["certainty"], "auto"),
         ),
         row("milling, map 200 x 100 converged, 2 x 2 modes", Unit::Time, us(2e6), us(0.8e6), || {
             milling::map(Teeth::Straight)

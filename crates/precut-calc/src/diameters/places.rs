@@ -10,27 +10,39 @@ pub(crate) struct Places {
 }
 
 impl Places {
-    /// Largest and smallest error, between the stations, too: there by the parabola through three neighbours.
+    /// Largest and smallest error, between the stations, too.
     pub(crate) fn extremes_um(&self, errors_um: &[f64]) -> [f64; 2] {
         let mut most = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut take = |error: f64| most = [most[0].max(error), most[1].min(error)];
         for zone in &self.zones {
-            for (i, &error) in errors_um[zone.clone()].iter().enumerate() {
-                most = [most[0].max(error), most[1].min(error)];
-                let here = zone.start + i;
-                if here > zone.start && here + 1 < zone.end {
-                    let around = here - 1..here + 2;
-                    if let Some(top) = top(&self.z_mm[around.clone()], &errors_um[around]) {
-                        most = [most[0].max(top), most[1].min(top)];
-                    }
-                }
-            }
+            let (z, e) = (&self.z_mm[zone.clone()], &errors_um[zone.clone()]);
+            e.iter().for_each(|error| take(*error));
+            (1..e.len()).filter_map(|end| between(z, e, end)).for_each(&mut take);
         }
         most
     }
 }
 
-/// The value at the top or bottom of the parabola through three points, where that lies within them.
-fn top(z: &[f64], e: &[f64]) -> Option<f64> {
+/// The top or bottom between a place and the one before it, by the parabolas through these two and either neighbour: where both have
+/// one, that which is less beyond the ends. At a bend beside a long step one parabola alone swings far beyond both.
+fn between(z: &[f64], e: &[f64], end: usize) -> Option<f64> {
+    let within = z[end - 1]..=z[end];
+    let through = |from: usize| -> Option<Option<f64>> {
+        let three = from..from + 3;
+        let top = top(z.get(three.clone())?, e.get(three)?);
+        Some(top.filter(|(at, _)| within.contains(at)).map(|(_, value)| value))
+    };
+    let beyond = |top: f64| (top - e[end - 1]).abs().min((top - e[end]).abs());
+    match (end.checked_sub(2).and_then(through), through(end - 1)) {
+        (Some(before), Some(after)) => {
+            before.zip(after).map(|(one, other)| if beyond(one) <= beyond(other) { one } else { other })
+        }
+        (one, other) => one.or(other).flatten(),
+    }
+}
+
+/// Where the parabola through three points turns, and its value there.
+fn top(z: &[f64], e: &[f64]) -> Option<(f64, f64)> {
     let [z, e]: [[f64; 3]; 2] = [z.try_into().ok()?, e.try_into().ok()?];
     if (e[1] - e[0]) * (e[2] - e[1]) >= 0.0 {
         return None;
@@ -39,18 +51,33 @@ fn top(z: &[f64], e: &[f64]) -> Option<f64> {
     let (left, right) = ((e[1] - e[0]) / before, (e[2] - e[1]) / after);
     let curvature = (right - left) / (before + after);
     let slope = (left * after + right * before) / (before + after);
-    Some(e[1] - 0.25 * slope * slope / curvature)
+    Some((z[1] - 0.5 * slope / curvature, e[1] - 0.25 * slope * slope / curvature))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn places(z_mm: &[f64]) -> Places {
+        Places { z_mm: z_mm.to_vec(), zones: std::iter::once(0..z_mm.len()).collect() }
+    }
+
     #[test]
     fn a_parabola_has_its_top() {
         let e = |z: f64| 7.0 - 0.5 * (z - 1.3).powi(2);
-        let z = [0.0, 1.0, 2.5];
-        assert!(top(&z, &z.map(e)).is_some_and(|top| (top - 7.0).abs() < 1e-12));
-        assert_eq!(top(&z, &[1.0, 2.0, 3.0]), None);
+        for z in [vec![0.0, 1.0, 2.5], vec![-1.0, 0.2, 1.1, 2.0, 4.0]] {
+            let errors: Vec<f64> = z.iter().map(|z| e(*z)).collect();
+            assert!((places(&z).extremes_um(&errors)[0] - 7.0).abs() < 1e-12);
+        }
+        assert_eq!(places(&[0.0, 1.0, 2.5]).extremes_um(&[1.0, 2.0, 3.0]), [3.0, 1.0]);
+    }
+
+    /// At the end of a long straight stretch something falls within a short step: no curve through the places needs to rise far above.
+    #[test]
+    fn a_bend_beside_a_long_step_does_not_swing_beyond() {
+        let z = [0.0, 50.0, 100.0, 100.5, 101.0];
+        let [most, _] = places(&z).extremes_um(&[0.0, 0.1, 0.2, -1.3, -2.8]);
+        let through_three = top(&z[1..4], &[0.1, 0.2, -1.3]).unwrap();
+        assert!(most <= 0.2 + 1e-12 && through_three.1 > 1.0, "{most}, by one parabola {through_three:?}");
     }
 }
