@@ -482,12 +482,11 @@ fn example_conforms(registry: &Registry, entry: &Entry, example: &Example) -> Ve
     assert_eq!(ready.canonical, serde_json_canonicalizer::to_vec(&input).unwrap());
     let names = input.to_string();
     let of_toy;
-    let stored = match answered(meta.id, example.id) {
-        Some(stored) => stored,
-        None => {
-            of_toy = compute(&ready, &Unwatched).unwrap();
-            &of_toy
-        }
+    let stored = if let Some(stored) = answered(meta.id, example.id) {
+        stored
+    } else {
+        of_toy = compute(&ready, &Unwatched).unwrap();
+        &of_toy
     };
     let answer = envelope(stored);
     for message in answer["explanation"].as_array().unwrap().iter().map(|item| kept::message(item).unwrap()) {

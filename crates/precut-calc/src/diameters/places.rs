@@ -16,8 +16,7 @@ impl Places {
         let mut take = |error: f64| most = [most[0].max(error), most[1].min(error)];
         for zone in &self.zones {
             let (z, e) = (&self.z_mm[zone.clone()], &errors_um[zone.clone()]);
-            e.iter().for_each(|error| take(*error));
-            (1..e.len()).filter_map(|end| between(z, e, end)).for_each(&mut take);
+            e.iter().copied().chain((1..e.len()).filter_map(|end| between(z, e, end))).for_each(&mut take);
         }
         most
     }
@@ -69,7 +68,8 @@ mod tests {
             let errors: Vec<f64> = z.iter().map(|z| e(*z)).collect();
             assert!((places(&z).extremes_um(&errors)[0] - 7.0).abs() < 1e-12);
         }
-        assert_eq!(places(&[0.0, 1.0, 2.5]).extremes_um(&[1.0, 2.0, 3.0]), [3.0, 1.0]);
+        let rising = places(&[0.0, 1.0, 2.5]).extremes_um(&[1.0, 2.0, 3.0]);
+        assert!((rising[0] - 3.0).abs() + (rising[1] - 1.0).abs() < 1e-12);
     }
 
     /// At the end of a long straight stretch something falls within a short step: no curve through the places needs to rise far above.
@@ -77,7 +77,7 @@ mod tests {
     fn a_bend_beside_a_long_step_does_not_swing_beyond() {
         let z = [0.0, 50.0, 100.0, 100.5, 101.0];
         let [most, _] = places(&z).extremes_um(&[0.0, 0.1, 0.2, -1.3, -2.8]);
-        let through_three = top(&z[1..4], &[0.1, 0.2, -1.3]).unwrap();
-        assert!(most <= 0.2 + 1e-12 && through_three.1 > 1.0, "{most}, by one parabola {through_three:?}");
+        let one = top(&z[1..4], &[0.1, 0.2, -1.3]).map(|(_, value)| value);
+        assert!(most <= 0.2 + 1e-12 && one.is_some_and(|one| one > 1.0), "{most}, by one parabola {one:?}");
     }
 }

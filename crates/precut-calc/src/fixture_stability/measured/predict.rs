@@ -150,7 +150,7 @@ impl PreparedFixture {
                     predicted.extend(self.margins(&case, &rows, chatter, &mut unit, ask.monitor)?);
                 }
                 Measure::PeakToPeak => {
-                    let prediction = self.peak_to_peak(&case, &mut unit_mm, modulus, ask)?;
+                    let prediction = Self::peak_to_peak(&case, &mut unit_mm, modulus, ask)?;
                     predicted.extend(rows.into_iter().map(|row| (row, prediction)));
                 }
                 Measure::DepthLimit => {
@@ -205,7 +205,6 @@ impl PreparedFixture {
     /// The exact forced motion; a chattering point has no amplitude that a small change moves a little. `unit_mm` is
     /// the amplitude at 1 mm of depth, where the motion goes with H^(1-mu).
     fn peak_to_peak(
-        &self,
         case: &Case,
         unit_mm: &mut Option<f64>,
         modulus: Prediction,
