@@ -43,9 +43,6 @@ fn between(z: &[f64], e: &[f64], end: usize) -> Option<f64> {
 /// Where the parabola through three points turns, and its value there.
 fn top(z: &[f64], e: &[f64]) -> Option<(f64, f64)> {
     let [z, e]: [[f64; 3]; 2] = [z.try_into().ok()?, e.try_into().ok()?];
-    if (e[1] - e[0]) * (e[2] - e[1]) >= 0.0 {
-        return None;
-    }
     let (before, after) = (z[1] - z[0], z[2] - z[1]);
     let (left, right) = ((e[1] - e[0]) / before, (e[2] - e[1]) / after);
     let curvature = (right - left) / (before + after);

@@ -6,7 +6,10 @@
 //! `begun' = (phi begun + shift) + (phi end + start) F1`, and the position that its feed is taken at is the same with
 //! `phi end + start + end`: two operations from one force to the next feed instead of seven (`fixture/3.2`).
 
-use super::{Cell, Record, State, Surface, demands, index, take};
+use crate::fixture_stability::model::response::demands;
+
+use super::state::{State, index};
+use super::{Cell, Record, Surface, take};
 use crate::num::dde::times;
 
 use crate::fixture_stability::model::holding::Closed;
