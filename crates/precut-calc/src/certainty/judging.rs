@@ -10,7 +10,7 @@ use super::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Quantity, U
 
 /// How far a probability that is told is checked on the real model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Check {
+pub(crate) enum Checking {
     /// Not at all: a response surface tells it.
     None,
     /// On lines.
@@ -74,26 +74,26 @@ pub(crate) trait Judging<const K: usize, const S: usize>: Sized {
         self.with(self.uncertainties().held(places))
     }
 
-    /// What is told of a place, within bounds at the least probability.
-    fn told(&self, at: Self::At, wanted: f64, check: Check) -> Result<Told, Failure> {
+    /// Tells the probability at a place. Where bounds alone are known of a quantity it is the least within them.
+    fn told(&self, at: Self::At, wanted: f64, check: Checking) -> Result<Told, Failure> {
         let Some(Extremes { least, most, search }) = self.extremes(at)? else {
             return self.told_alone(at, wanted, check);
         };
         let told = self.held(&least).told_alone(at, wanted, check)?;
         let most = self.held(&most);
-        let most = if check == Check::None { most.nearly(at)? } else { most.alone(at, Self::MOST_LINES)? };
+        let most = if check == Checking::None { most.nearly(at)? } else { most.alone(at, Self::MOST_LINES)? };
         Ok(Told { joint: told.joint.least(most, search), ..told })
     }
 
     /// The same with the quantities between bounds where they are.
-    fn told_alone(&self, at: Self::At, wanted: f64, check: Check) -> Result<Told, Failure> {
+    fn told_alone(&self, at: Self::At, wanted: f64, check: Checking) -> Result<Told, Failure> {
         let real = self.real(at)?;
         let asked = self.asked(&real, Self::MOST_LINES);
         let (limits, seed) = (asked.limits, asked.seed);
         let around = Around::of(asked)?;
-        let found = if check == Check::None { around.by_surface()? } else { around.found()? };
+        let found = if check == Checking::None { around.by_surface()? } else { around.found()? };
         let joint = JointlyKept::of(found.of[S - 1], wanted);
-        let compared = if let Check::WithHalves(lines) = check { Some(lines) } else { None };
+        let compared = if let Checking::WithHalves(lines) = check { Some(lines) } else { None };
         let mut contributions = around.contributions(&found, compared)?;
         let at_half = &mut |of: &Uncertainties<Self::Of>| self.with(of.clone()).nearly(at);
         contributions.extend(self.uncertainties().contributions_within(joint.probability, at_half)?);

@@ -2,7 +2,7 @@
 
 use crate::calculator::Cost;
 use crate::certainty::ProbabilityCheck;
-use crate::certainty::judging::Check;
+use crate::certainty::judging::Checking;
 
 use crate::fixture_stability::answer::probable_depths::{BOUNDARIES, LEAST_SPEEDS, scales};
 use crate::fixture_stability::job::acting::Case;
@@ -98,22 +98,22 @@ impl<'a> Points<'a> {
     }
 
     /// A probability at the working point.
-    fn probability_ms(&self, check: Check) -> f64 {
+    fn probability_ms(&self, check: Checking) -> f64 {
         match check {
-            Check::None => SURFACE_MS + VISES_OF_SURFACE * self.vise_ms(),
-            Check::OnLines | Check::WithHalves(_) => VISES * self.vise_ms(),
+            Checking::None => SURFACE_MS + VISES_OF_SURFACE * self.vise_ms(),
+            Checking::OnLines | Checking::WithHalves(_) => VISES * self.vise_ms(),
         }
     }
 }
 
 /// How the probability is found that is told without the analysis `certainty`; `None` where even a response surface takes too long.
-pub(in crate::fixture_stability) fn without_analysis(case: &Case, asked_for: ProbabilityCheck) -> Option<Check> {
+pub(in crate::fixture_stability) fn without_analysis(case: &Case, asked_for: ProbabilityCheck) -> Option<Checking> {
     let points = Points::new(case);
-    let is_soon = |check: &Check| points.probability_ms(*check) <= UNASKED_MS;
+    let is_soon = |check: &Checking| points.probability_ms(*check) <= UNASKED_MS;
     match asked_for {
-        ProbabilityCheck::Always => Some(Check::OnLines),
-        ProbabilityCheck::Auto => [Check::OnLines, Check::None].into_iter().find(is_soon),
-        ProbabilityCheck::Never => Some(Check::None).filter(is_soon),
+        ProbabilityCheck::Always => Some(Checking::OnLines),
+        ProbabilityCheck::Auto => [Checking::OnLines, Checking::None].into_iter().find(is_soon),
+        ProbabilityCheck::Never => Some(Checking::None).filter(is_soon),
     }
 }
 
@@ -172,7 +172,7 @@ pub(in crate::fixture_stability) fn cost(job: &FixtureJob) -> Cost {
         }
     }
     if job.asks(Analysis::Certainty) {
-        parts.push((PROBABILITIES * points.probability_ms(Check::OnLines), "/analyses"));
+        parts.push((PROBABILITIES * points.probability_ms(Checking::OnLines), "/analyses"));
         if scales(&case) {
             let traced = BOUNDARIES as f64 * speeds.max(LEAST_SPEEDS as f64);
             parts.push((traced * OF_BOUNDARY * mean_ms, "/lobes/speeds"));

@@ -1,4 +1,4 @@
-//! What other cuts would make of the probability that a part is good (`certainty/4.4`): each is planned and judged as the job's own is.
+//! Other cuts that make a good part more probable (`certainty/4.4`). Each is planned and judged as a job of its own.
 
 use crate::calculator::{Failure, Monitor};
 use crate::certainty::lines::Estimate;
@@ -26,12 +26,12 @@ const MOST_PASSES: usize = 20;
 /// Another cut, and how it is told.
 struct OtherCut {
     job: Job,
-    /// Of the probability that it has, and of its gain.
+    /// Makes the advice from the probability of a good part and its gain.
     told: Box<dyn FnOnce(f64, f64) -> Improvement>,
 }
 
-/// Of a job whose probability falls short of what is wanted the other cuts that raise it by more than both errors. One more rest is tried
-/// where the ordinary answer has tried it.
+/// The other cuts that raise the probability by more than both errors. None is tried where the job has the probability that it wants; one
+/// more rest is tried where the ordinary answer has tried it.
 pub(in crate::deflection_compensation) fn improvements(
     job: &Job,
     now: &JointlyKept,
@@ -71,13 +71,9 @@ fn estimate(job: &Job, monitor: &dyn Monitor) -> Result<Option<Estimate>, Failur
 /// The last pass with a smaller feed.
 fn slower(job: &Job) -> Option<OtherCut> {
     let mut slower = job.clone();
-    let own = slower.passes.last_mut().and_then(|pass| pass.feed_mm_per_rev.as_mut());
-    let feed = match own {
-        Some(feed) => feed,
-        None => match slower.passes.last_mut() {
-            Some(pass) => pass.feed_mm_per_rev.insert(job.cut.feed_mm_per_rev),
-            None => &mut slower.cut.feed_mm_per_rev,
-        },
+    let feed = match slower.passes.last_mut() {
+        Some(pass) => pass.feed_mm_per_rev.get_or_insert(job.cut.feed_mm_per_rev),
+        None => &mut slower.cut.feed_mm_per_rev,
     };
     *feed *= SLOWER;
     let feed_mm_per_rev = *feed;

@@ -208,7 +208,7 @@ impl<'a> Linear<'a> {
             let with = evidence(Some(v))?;
             Some((with.log_z + self.log_share(hypothesis, v), v, with.t))
         };
-        // Of several places of one point that counts which explains most.
+        // A point of the grid may be linearised about several places: the one that explains most counts.
         let mut of_cells: BTreeMap<usize, (f64, usize, Vec<f64>)> = BTreeMap::new();
         for tried in (0..self.variants(hypothesis).len()).filter_map(weighed) {
             let cell = of_cells.entry(self.cell(&[hypothesis], &[tried.1])).or_insert_with(|| tried.clone());

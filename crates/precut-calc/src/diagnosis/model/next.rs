@@ -95,7 +95,7 @@ pub(in crate::diagnosis) fn next_measurement<M: Diagnosable>(
     let planning: Planning<'_, M> = Planning { job, rows, weighing, monitor };
     let ranges = Ranges(&job.options.ranges);
     let runs = match weighing.foundation.data.sides {
-        // Of a class a run tells most where what may be right is on either side of its limit.
+        // A class tells most where one likely set foresees it and another does not: between their limits.
         Some(_) => {
             let likely = likely_effects::<M>(job, rows, weighing, [Some(leader), rival], monitor)?;
             M::next_runs_between(&job.job, rows, ranges, &likely, monitor)?

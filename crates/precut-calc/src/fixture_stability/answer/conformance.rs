@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Failure, Finding, Message, Monitor};
 use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
-use crate::certainty::judging::{Check, Judging, Told};
+use crate::certainty::judging::{Checking, Judging, Told};
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 
@@ -111,12 +111,12 @@ impl<'a> Judged<'a> {
     /// The block of the answer, with the depth of the wanted probability up to `deepest_mm`.
     pub(in crate::fixture_stability) fn asked_for(&self, deepest_mm: f64) -> Result<FixtureConformance, Failure> {
         let (working, wanted) = (self.case.working, self.job.uncertainty.wanted_probability);
-        let conformance = self.conformance(Check::WithHalves(COMPARED_LINES))?;
+        let conformance = self.conformance(Checking::WithHalves(COMPARED_LINES))?;
         Ok(FixtureConformance { depth_at_wanted_mm: self.depth_mm(working, wanted, deepest_mm)?, ..conformance })
     }
 
     /// The block of the answer without that depth.
-    pub(in crate::fixture_stability) fn conformance(&self, check: Check) -> Result<FixtureConformance, Failure> {
+    pub(in crate::fixture_stability) fn conformance(&self, check: Checking) -> Result<FixtureConformance, Failure> {
         let wanted = self.job.uncertainty.wanted_probability;
         let Told { limits, joint, contributions, method } = self.told(self.case.working, wanted, check)?;
         Ok(FixtureConformance { limits, joint, contributions, depth_at_wanted_mm: None, method })

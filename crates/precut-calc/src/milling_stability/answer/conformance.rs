@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::calculator::{Failure, Finding, Message};
 use crate::certainty::around::{Asked, Real, far};
 use crate::certainty::deepest::deepest_mm;
-use crate::certainty::judging::{Check, Judging, Told};
+use crate::certainty::judging::{Checking, Judging, Told};
 use crate::certainty::lines::{Margins, Together};
 use crate::certainty::{ConformanceMethod, Contribution, JointlyKept, LimitKept, Uncertainties, improbable, probably};
 use crate::clamping::Load;
@@ -91,7 +91,7 @@ pub(super) fn conformance(study: &Study<'_>) -> Result<Option<MillingConformance
     let depth_mm = study.case.depth_mm;
     let wanted = study.job.uncertainty.wanted_probability;
     let Told { limits, joint, contributions, method } =
-        judged.told(depth_mm, wanted, Check::WithHalves(COMPARED_LINES))?;
+        judged.told(depth_mm, wanted, Checking::WithHalves(COMPARED_LINES))?;
     let mut probability = |depth_mm: f64| judged.probability(depth_mm);
     let depth_at_wanted_mm = deepest_mm(depth_mm, study.examined_mm, wanted, &mut probability)?;
     Ok(Some(MillingConformance { limits, joint, contributions, depth_at_wanted_mm, method }))

@@ -291,14 +291,15 @@ pub(in crate::fixture_stability) fn outcome(study: &Study<'_>) -> Result<(Fixtur
 fn certainty(study: &Study<'_>) -> Result<(Option<FixtureConformance>, Option<ProbableDepths>), Failure> {
     let Study { job, case, monitor, .. } = study;
     let Some(judged) = Judged::of(job, case, &study.rules, *monitor)? else { return Ok((None, None)) };
-    monitor.progress(0.995, Message::new("stage_certainty"));
+    let begins = || monitor.progress(0.995, Message::new("stage_certainty"));
     if job.asks(Analysis::Certainty) {
+        begins();
         let conformance = judged.asked_for(study.examined_mm)?;
         return Ok((Some(conformance), probable_depths(study, &judged)?));
     }
-    let conformance =
-        without_analysis(case, job.uncertainty.check).map(|check| judged.conformance(check)).transpose()?;
-    Ok((conformance, None))
+    let Some(check) = without_analysis(case, job.uncertainty.check) else { return Ok((None, None)) };
+    begins();
+    Ok((Some(judged.conformance(check)?), None))
 }
 
 /// Width of the strip within the cutter times depth times table feed, cm3/min.
