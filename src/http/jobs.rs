@@ -21,11 +21,6 @@ use super::query::Query;
 use crate::engine::{CacheState, Job, JobQuery, JobState, Priority, Timings};
 use crate::text::{Language, Texts, told};
 
-/// Most jobs of one page.
-pub(super) const MOST_ITEMS: u32 = 500;
-/// Jobs of one page unless asked for more or fewer.
-pub(super) const DEFAULT_ITEMS: u32 = 50;
-
 /// A job: what became of a request that is not answered at once.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Job)]
@@ -241,7 +236,7 @@ pub(super) async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["state", "calculator", "limit", "after"])?;
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let limit = query.limit()?;
     let state = query.one_of("state", JobState::ALL, JobState::word)?;
     let before = query.after()?;
     let calculator = query.calculator(&app.engine)?;

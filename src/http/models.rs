@@ -12,17 +12,13 @@ use utoipa::ToSchema;
 
 use super::auth::Caller;
 use super::problem::Problem;
-use super::query::Query;
+use super::query::{Query, page};
 use super::{App, body, gate, jobs, results};
 use crate::config::Limits;
 use crate::engine::{Body, ModelAnswer, ModelError, ModelSource, StoredModel};
 
 /// Largest model that is read, bytes: four times what is kept of one, for who writes it with white space.
 const MOST_BYTES: usize = 1 << 20;
-/// Most models of one page.
-pub(super) const MOST_ITEMS: u32 = 500;
-/// Models of one page unless asked for more or fewer.
-pub(super) const DEFAULT_ITEMS: u32 = 50;
 
 /// A stored model. What `GET` gives, `PUT` takes again, here or elsewhere.
 #[derive(Debug, Clone, Serialize, ToSchema)]
@@ -154,12 +150,10 @@ pub(super) async fn list(
     uri: Uri,
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["limit", "after"])?;
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
-    // One more than asked for tells whether there is another page.
+    let limit = query.limit()?;
     let shelf = caller.shelf();
-    let mut models = app.engine.models(&shelf, query.text("after").unwrap_or_default(), limit + 1).await?;
-    let more = models.len() > limit as usize;
-    models.truncate(limit as usize);
+    let models = app.engine.models(&shelf, query.text("after").unwrap_or_default(), limit + 1).await?;
+    let (models, more) = page(models, limit);
     let next = models.last().filter(|_| more).map(|last| format!("/v1/models?limit={limit}&after={}", last.name));
     Ok(answered(StatusCode::OK, &ModelList { items: models.into_iter().map(document).collect(), next }))
 }

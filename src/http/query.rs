@@ -14,6 +14,18 @@ use super::problem::Problem;
 use crate::engine::{Engine, Error};
 use crate::registry::nearest;
 
+/// Most things on one page of a list.
+pub(super) const MOST_ITEMS: u32 = 500;
+/// As many on a page unless asked for more or fewer.
+pub(super) const DEFAULT_ITEMS: u32 = 50;
+
+/// The first of things of which one more was read than a page takes, and whether there is another page.
+pub(super) fn page<T>(mut things: Vec<T>, limit: u32) -> (Vec<T>, bool) {
+    let more = things.len() > limit as usize;
+    things.truncate(limit as usize);
+    (things, more)
+}
+
 /// The parameters of a request, each once and each known to its address.
 pub(super) struct Query(BTreeMap<String, String>);
 
@@ -93,6 +105,11 @@ impl Query {
             let (least, most) = (range.start().to_string(), range.end().to_string());
             fault("out_of_range", name).with("received", text).with("least", least).with("most", most)
         })
+    }
+
+    /// How many things a page shall have.
+    pub(super) fn limit(&mut self) -> Result<u32, Problem> {
+        Ok(self.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS))
     }
 
     /// One of some words.

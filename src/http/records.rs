@@ -15,7 +15,7 @@ use super::auth::Caller;
 use super::document::Document;
 use super::library::{Around, said};
 use super::problem::Problem;
-use super::query::Query;
+use super::query::{MOST_ITEMS, Query};
 use super::{App, body, gate, negotiate};
 use crate::config::Limits;
 use crate::engine::{Body, RecordAnswer, RecordError, RecordQuery, StoredRecord};
@@ -23,8 +23,6 @@ use crate::text::Language;
 
 /// Largest body that is read, bytes: four times what is kept of a record, for who writes it with white space.
 const MOST_BYTES: usize = 4 * MAX_BYTES;
-/// Most records of one page, which has as many unless fewer are asked for.
-pub(super) const MOST_ITEMS: u32 = 500;
 
 /// The addresses of a kind.
 pub(super) fn routes(kind: Kind) -> Router<App> {

@@ -21,11 +21,6 @@ use crate::engine::{Key, Stored, Summary};
 use crate::store::{Cursor, ResultPage, ResultQuery, ResultSummary};
 use crate::text::{Language, told};
 
-/// Most results of one page.
-pub(super) const MOST_ITEMS: u32 = 500;
-/// Results of one page unless asked for more or fewer.
-pub(super) const DEFAULT_ITEMS: u32 = 50;
-
 /// A page of kept results.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct ResultList {
@@ -81,7 +76,7 @@ pub(super) async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["calculator", "record", "limit", "after"])?;
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let limit = query.limit()?;
     let after = query.after::<Cursor>()?;
     let calculator = query.calculator(&app.engine)?;
     let record = query.record()?;

@@ -11,10 +11,15 @@ use super::number;
 /// a formula has an apostrophe in front, see `defused`.
 #[allow(clippy::missing_panics_doc)] // writing to memory cannot fail
 pub fn csv(table: &Table) -> String {
-    let mut writer = WriterBuilder::new().terminator(Terminator::Any(b'\n')).from_writer(Vec::new());
     let rows = table.columns.iter().map(length).max().unwrap_or(0);
     let lines = std::iter::once(table.columns.iter().map(header).collect::<Vec<_>>())
         .chain((0..rows).map(|row| table.columns.iter().map(|column| cell(column, row)).collect()));
+    csv_lines(lines)
+}
+
+/// Lines of cells as CSV; all have as many cells as the first.
+pub(crate) fn csv_lines(lines: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = WriterBuilder::new().terminator(Terminator::Any(b'\n')).from_writer(Vec::new());
     for line in lines {
         writer.write_record(line).expect("memory takes every record, and all have the width of the table");
     }

@@ -12,7 +12,7 @@ mod svg;
 mod xlsx;
 
 pub use self::csv::csv;
-pub(crate) use self::csv::defused;
+pub(crate) use self::csv::{csv_lines, defused};
 pub use self::gcode::gcode;
 pub use self::pdf::{PdfError, pdf};
 pub use self::report::{Counted, Counts, Datum, Equation, Field, Headings, Picture, Report, Sheet};

@@ -7,6 +7,7 @@ use utoipa::openapi::{Content, Object, RefOr, Required, Schema};
 
 use super::parts;
 use crate::http::negotiate::Media;
+use crate::http::query::DEFAULT_ITEMS;
 use crate::http::{calculators, codes, health, pages, parts as result_parts, provenance, results};
 use crate::registry::Registry;
 
@@ -94,11 +95,7 @@ fn list_results(registry: &Registry) -> OperationBuilder {
         "Which answers are kept?",
         "The kept answers, newest first, by pages: follow `next` until it is null.",
     )
-    .parameter(query(
-        "limit",
-        "Most results of one page.",
-        parts::integer(1, results::MOST_ITEMS, results::DEFAULT_ITEMS),
-    ))
+    .parameter(parts::limit("Most results of one page.", DEFAULT_ITEMS))
     .parameter(query("calculator", "Only those of this calculator.", calculator))
     .parameter(query(
         "record",

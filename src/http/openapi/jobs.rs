@@ -12,6 +12,7 @@ use utoipa::openapi::{Content, Object, RefOr, Required, Schema, SchemaFormat};
 use super::parts;
 use crate::http::calculators::{LEAST_DEADLINE_S, MOST_DEADLINE_S};
 use crate::http::negotiate::Media;
+use crate::http::query::DEFAULT_ITEMS;
 use crate::http::{callbacks, events, jobs};
 use crate::registry::Registry;
 use crate::store::jobs::{JobState, Priority};
@@ -195,7 +196,7 @@ fn list(registry: &Registry) -> OperationBuilder {
         "Which jobs are there?",
         "The jobs, newest first, by pages: follow `next` until it is null.",
     )
-    .parameter(query("limit", "Most jobs of one page.", parts::integer(1, jobs::MOST_ITEMS, jobs::DEFAULT_ITEMS)))
+    .parameter(parts::limit("Most jobs of one page.", DEFAULT_ITEMS))
     .parameter(query(
         "state",
         "Only those in this state.",

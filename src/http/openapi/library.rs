@@ -13,6 +13,7 @@ use utoipa::openapi::{Ref, RefOr, Required, Schema};
 use super::parts;
 use crate::engine::{ImportReport, RecordComparison};
 use crate::http::provenance::RecordOrigin;
+use crate::http::query::MOST_ITEMS;
 use crate::http::{library, records};
 
 const NAME: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
@@ -214,7 +215,7 @@ fn list(kind: Kind) -> OperationBuilder {
     .parameter(query("q", "What somebody types: name, title, any other name.", parts::string()))
     .parameter(query(class, about, parts::string()))
     .parameter(query("own", "`true`: without the engine's.", yes_or_no()))
-    .parameter(query("limit", "Most of one page.", parts::integer(1, records::MOST_ITEMS, records::MOST_ITEMS)))
+    .parameter(parts::limit("Most of one page.", MOST_ITEMS))
     .parameter(query("after", "Where the page before ended: taken from its `next`.", parts::string()));
     let page = parts::success("A page.", "application/json", parts::json_of(&format!("{}List", component(kind))));
     parts::guarded(parts::conditional(operation.response("200", parts::tagged(page))), &[400, 507])

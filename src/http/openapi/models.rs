@@ -11,6 +11,7 @@ use utoipa::openapi::{Ref, RefOr, Required, Schema};
 use super::parts;
 use crate::engine::ModelComparison;
 use crate::http::models;
+use crate::http::query::DEFAULT_ITEMS;
 
 const NAME: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
 const REVISION: &str = "^[a-z0-9][a-z0-9_-]{0,63}(@[1-9][0-9]{0,8})?$";
@@ -57,7 +58,7 @@ fn list() -> OperationBuilder {
         "Which models are stored?",
         "The newest revision of each stored model, by name and by pages: follow `next` until it is null.",
     )
-    .parameter(query("limit", "Most models of one page.", parts::integer(1, models::MOST_ITEMS, models::DEFAULT_ITEMS)))
+    .parameter(parts::limit("Most models of one page.", DEFAULT_ITEMS))
     .parameter(query("after", "Where the page before ended: taken from its `next`.", parts::string()))
     .response("200", parts::success("A page of models.", "application/json", parts::json_of("ModelList")));
     parts::guarded(operation, &[400, 507])

@@ -13,6 +13,7 @@ use utoipa::openapi::{Content, Object, Ref, RefOr, Required, Schema};
 use crate::http::answer::Include;
 use crate::http::negotiate::Media;
 use crate::http::problem::ProblemDocument;
+use crate::http::query::MOST_ITEMS;
 use crate::text::Remark;
 
 pub(super) const BEARER: &str = "bearer";
@@ -202,6 +203,11 @@ pub(super) fn parameter(name: &str, place: ParameterIn, text: &str, schema: Obje
         .required(Required::False)
         .description(Some(text))
         .schema(Some(schema))
+}
+
+/// How many things a page of a list shall have.
+pub(super) fn limit(text: &str, default: u32) -> Parameter {
+    parameter("limit", ParameterIn::Query, text, integer(1, MOST_ITEMS, default)).build()
 }
 
 /// What an answer as JSON may bring along.

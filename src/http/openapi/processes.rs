@@ -13,6 +13,7 @@ use utoipa::openapi::{Ref, RefOr, Required};
 use super::{jobs, parts};
 use crate::engine::WhichPath;
 use crate::http::processes;
+use crate::http::query::DEFAULT_ITEMS;
 use crate::registry::Registry;
 pub(super) use schemas::schemas;
 
@@ -71,7 +72,7 @@ fn query(name: &str, about: &str, schema: Object) -> Parameter {
 }
 
 fn limit() -> Parameter {
-    query("limit", "Most of one page.", parts::integer(1, processes::MOST_ITEMS, processes::DEFAULT_ITEMS))
+    parts::limit("Most of one page.", DEFAULT_ITEMS)
 }
 
 fn header(name: &str, about: &str) -> Parameter {

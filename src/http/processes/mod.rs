@@ -24,17 +24,13 @@ use serde_json::{Value, json};
 
 use super::auth::Caller;
 use super::problem::Problem;
-use super::query::Query;
+use super::query::{Query, page};
 use super::{App, body, gate, negotiate};
 use crate::engine::{Body, KeptProcess, Precondition, ProcessError, in_language, parsed};
 use crate::text::Language;
 
-/// Most processes, parts or entries of one page.
-pub(super) const MOST_ITEMS: u32 = 500;
 /// Largest number of a part or an entry, and largest condition of the next part, that can be asked for.
 pub(super) const MOST_NUMBER: u32 = 1_000_000_000;
-/// As many on a page unless asked for more or fewer.
-pub(super) const DEFAULT_ITEMS: u32 = 50;
 
 /// Their addresses.
 pub(super) fn routes() -> Router<App> {
@@ -141,12 +137,9 @@ async fn list(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["limit", "after"])?;
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let limit = query.limit()?;
     let after = query.text("after").unwrap_or_default();
-    // One more than asked for tells whether there is another page.
-    let mut items = app.engine.processes(&caller.shelf(), after, limit + 1).await?;
-    let more = items.len() > limit as usize;
-    items.truncate(limit as usize);
+    let (items, more) = page(app.engine.processes(&caller.shelf(), after, limit + 1).await?, limit);
     let next = items.last().filter(|_| more).map(|last| format!("/v1/processes?limit={limit}&after={}", last.name));
     let language = negotiate::language(&headers);
     let items: Vec<Value> = items.iter().map(|process| document(process, language)).collect();

@@ -11,9 +11,9 @@ use serde_json::{Map, Value, json};
 
 use super::super::auth::Caller;
 use super::super::problem::Problem;
-use super::super::query::Query;
+use super::super::query::{Query, page};
 use super::super::{App, body, callbacks, gate, negotiate};
-use super::{DEFAULT_ITEMS, MOST_ITEMS, MOST_NUMBER, answered, located, precondition, tagged, time};
+use super::{MOST_NUMBER, answered, located, precondition, tagged, time};
 use crate::engine::{Body, PartAnswer, PartOutcome, ProcessError, in_language, parsed};
 use crate::store::processes::{Entry, KeptPart};
 use crate::text::Language;
@@ -73,11 +73,9 @@ pub(super) async fn list(
     let numbers = &(0..=MOST_NUMBER);
     let (from, to) = (query.number("from", numbers)?.unwrap_or(0), query.number("to", numbers)?);
     let state = query.one_of("state", STATES, |state| state)?;
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
+    let limit = query.limit()?;
     let range = (i64::from(from), to.map_or(i64::MAX, i64::from));
-    let mut parts = app.engine.process_parts(&caller.shelf(), &name, range, limit + 1).await?;
-    let more = parts.len() > limit as usize;
-    parts.truncate(limit as usize);
+    let (parts, more) = page(app.engine.process_parts(&caller.shelf(), &name, range, limit + 1).await?, limit);
     let next = parts.last().filter(|_| more).and_then(|last| last.number).map(|last| {
         let to = to.map(|to| format!("&to={to}")).unwrap_or_default();
         let state = state.map(|state| format!("&state={state}")).unwrap_or_default();
@@ -102,10 +100,9 @@ pub(super) async fn history(
 ) -> Result<Response, Problem> {
     let mut query = Query::of(&uri, &["after", "limit"])?;
     let after = query.number("after", &(0..=MOST_NUMBER))?.unwrap_or(0);
-    let limit = query.number("limit", &(1..=MOST_ITEMS))?.unwrap_or(DEFAULT_ITEMS);
-    let mut entries = app.engine.process_entries(&caller.shelf(), &name, after.into(), limit + 1).await?;
-    let more = entries.len() > limit as usize;
-    entries.truncate(limit as usize);
+    let limit = query.limit()?;
+    let entries = app.engine.process_entries(&caller.shelf(), &name, after.into(), limit + 1).await?;
+    let (entries, more) = page(entries, limit);
     let next = entries.last().filter(|_| more);
     let next = next.map(|last| format!("/v1/processes/{name}/history?limit={limit}&after={}", last.sequence));
     let language = negotiate::language(&headers);

@@ -1,7 +1,5 @@
 //! The state of a process: as JSON, as a table, as a picture.
 
-use std::fmt::Write as _;
-
 use axum::Extension;
 use axum::extract::{Path, State};
 use axum::http::header::CONTENT_TYPE;
@@ -17,6 +15,7 @@ use super::super::{App, answer};
 use super::figures::{self, FIGURES, Said};
 use super::tagged;
 use crate::engine::{Shelf, in_language};
+use crate::render::{csv_lines, defused};
 use crate::store::processes::KeptPart;
 
 /// Tables of a process.
@@ -56,112 +55,151 @@ pub(super) async fn state(
         return Ok(response);
     }
     let state = process.state.as_ref();
-    let text = match table {
+    let lines = match table {
         Some("changes") => changes(state),
         Some("model") => model(state),
-        Some("gain") => by_part(&app, &caller.shelf(), &name, (GAIN_HEADER, gained)).await?,
-        _ => by_part(&app, &caller.shelf(), &name, (HEADER, row)).await?,
+        Some("gain") => by_part(&app, &caller.shelf(), &name, (GAIN, gained)).await?,
+        _ => by_part(&app, &caller.shelf(), &name, (PARTS, |part| Some(row(part)))).await?,
     };
-    let mut response = Response::new(text.into());
+    let mut response = Response::new(csv_lines(lines).into());
     response.headers_mut().insert(CONTENT_TYPE, HeaderValue::from_static("text/csv; charset=utf-8"));
     Ok(response)
 }
 
-/// A line for each part.
+/// A line of a table, cell by cell.
+type Line = Vec<String>;
+
+/// A line for each part of which there is something to tell.
 async fn by_part(
     app: &App,
     shelf: &Shelf,
     process: &str,
-    (header, row): (&str, fn(&KeptPart) -> String),
-) -> Result<String, Problem> {
-    let (mut text, mut from) = (header.to_owned(), 0);
+    (names, line): (&str, fn(&KeptPart) -> Option<Line>),
+) -> Result<Vec<Line>, Problem> {
+    let (mut lines, mut from) = (vec![names.split(' ').map(str::to_owned).collect()], 0);
     loop {
         let page = app.engine.process_parts(shelf, process, (from, i64::MAX), PAGE).await?;
-        let Some(last) = page.last().and_then(|part| part.number) else { return Ok(text) };
+        let Some(last) = page.last().and_then(|part| part.number) else { return Ok(lines) };
         from = last + 1;
-        text.extend(page.iter().map(row));
+        lines.extend(page.iter().filter_map(line));
     }
 }
 
-const GAIN_HEADER: &str = "number,part,parts,parts_cut_with_new_path,form_gain_um,form_gain_lower_um,form_gain_upper_um,\
-    parts_saved,parts_saved_lower,parts_saved_upper,parts_spoilt,parts_spoilt_lower,parts_spoilt_upper\n";
+const GAIN: &str = "number part parts parts_cut_with_new_path form_gain_um form_gain_lower_um form_gain_upper_um \
+                    parts_saved parts_saved_lower parts_saved_upper parts_spoilt parts_spoilt_lower parts_spoilt_upper";
 
 /// The account as it was told after a part.
-fn gained(part: &KeptPart) -> String {
-    let Some(told) = Said::after(part).gain else { return String::new() };
-    let with_ends = |value: f64, [lower, upper]: [f64; 2]| format!("{value},{lower},{upper}");
-    let cells = [
-        told.parts.to_string(),
-        told.parts_cut_with_new_path.to_string(),
-        with_ends(told.form_gain_um, told.form_gain_interval_95),
-        with_ends(told.parts_saved, told.parts_saved_interval_95),
-        with_ends(told.parts_spoilt, told.parts_spoilt_interval_95),
+fn gained(part: &KeptPart) -> Option<Line> {
+    let told = Said::after(part).gain?;
+    let sizes = [
+        (told.form_gain_um, told.form_gain_interval_95),
+        (told.parts_saved, told.parts_saved_interval_95),
+        (told.parts_spoilt, told.parts_spoilt_interval_95),
     ];
-    format!("{},{},{}\n", part.number.unwrap_or_default(), part.part, cells.join(","))
+    let mut line = beginning(part);
+    line.extend([told.parts.to_string(), told.parts_cut_with_new_path.to_string()]);
+    line.extend(sizes.iter().flat_map(|(value, [lower, upper])| [value, lower, upper]).map(f64::to_string));
+    Some(line)
 }
 
-/// What the process is taken to be.
-fn model(state: Option<&Value>) -> String {
-    let mut text = "cause,label,parameter,unit,since_part,form,delta,lower,upper\n".to_owned();
-    let sizes = state.and_then(|state| state.pointer("/model/sizes")?.as_array());
-    for size in sizes.into_iter().flatten() {
-        let cells = [
-            "/kind",
-            "/label",
-            "/parameter",
-            "/unit",
-            "/since_part",
-            "/form",
-            "/delta",
-            "/interval_95/0",
-            "/interval_95/1",
-        ]
-        .map(|pointer| size.pointer(pointer).map(plain).unwrap_or_default());
-        let _ = writeln!(text, "{}", cells.join(","));
-    }
-    text
+fn beginning(part: &KeptPart) -> Line {
+    vec![part.number.unwrap_or_default().to_string(), part.part.clone()]
 }
 
-const HEADER: &str = "number,part,state,unused,evidence,chi2,p,change\n";
+/// Columns of a table, each with the place of its cell in what is told.
+type Columns = &'static [(&'static str, &'static str)];
 
-fn plain(value: &Value) -> String {
+fn names(columns: Columns) -> impl Iterator<Item = &'static str> {
+    columns.iter().map(|(name, _)| *name)
+}
+
+fn cells(columns: Columns, told: &Value) -> impl Iterator<Item = String> {
+    columns.iter().map(|(_, pointer)| told.pointer(pointer).map(cell).unwrap_or_default())
+}
+
+fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
-        Value::String(text) => text.clone(),
+        Value::String(word) => defused(word),
         other => other.to_string(),
     }
 }
 
-fn row(part: &KeptPart) -> String {
-    let now: Value = serde_json::from_str(&part.now).unwrap_or_default();
-    let number = part.number.unwrap_or_default();
-    let of = |pointer: &str| now.pointer(pointer).map(plain).unwrap_or_default();
-    let cells = ["/state", "/unused", "/evidence", "/score/chi2", "/score/p", "/change"].map(of);
-    format!("{number},{},{}\n", part.part, cells.join(","))
+const SIZE: Columns = &[
+    ("cause", "/kind"),
+    ("label", "/label"),
+    ("parameter", "/parameter"),
+    ("unit", "/unit"),
+    ("since_part", "/since_part"),
+    ("form", "/form"),
+    ("delta", "/delta"),
+    ("lower", "/interval_95/0"),
+    ("upper", "/interval_95/1"),
+];
+
+/// What the process is taken to be.
+fn model(state: Option<&Value>) -> Vec<Line> {
+    let sizes = state.and_then(|state| state.pointer("/model/sizes")?.as_array()).into_iter().flatten();
+    let header = names(SIZE).map(str::to_owned).collect();
+    std::iter::once(header).chain(sizes.map(|size| cells(SIZE, size).collect())).collect()
 }
 
-fn changes(state: Option<&Value>) -> String {
-    let mut text =
-        "id,since_part,from_part,to_part,reported_at_part,verdict,accepted,decided,cause,share,parameter,delta,lower,upper,unit\n"
-            .to_owned();
+const PARTS: &str = "number part state unused evidence chi2 p change";
+
+fn row(part: &KeptPart) -> Line {
+    let now: Value = serde_json::from_str(&part.now).unwrap_or_default();
+    let of = |pointer: &str| now.pointer(pointer).map(cell).unwrap_or_default();
+    let mut line = beginning(part);
+    line.extend(["/state", "/unused", "/evidence", "/score/chi2", "/score/p", "/change"].map(of));
+    line
+}
+
+const CHANGE: Columns = &[
+    ("id", "/id"),
+    ("since_part", "/since_part"),
+    ("from_part", "/since_parts_90/0"),
+    ("to_part", "/since_parts_90/1"),
+    ("reported_at_part", "/reported_at_part"),
+    ("verdict", "/verdict"),
+    ("accepted", "/accepted"),
+    ("decided", "/decided"),
+];
+const CAUSE: Columns = &[
+    ("cause", "/kind"),
+    ("share", "/share"),
+    ("parameter", "/parameter"),
+    ("delta", "/delta"),
+    ("lower", "/interval_95/0"),
+    ("upper", "/interval_95/1"),
+    ("unit", "/unit"),
+];
+
+/// A line for every cause of every change.
+fn changes(state: Option<&Value>) -> Vec<Line> {
+    let mut lines = vec![names(CHANGE).chain(names(CAUSE)).map(str::to_owned).collect()];
     let all = state.and_then(|state| state["changes"].as_array()).into_iter().flatten();
     for change in all {
-        for cause in change["causes"].as_array().into_iter().flatten() {
-            let of_change = [
-                "/id",
-                "/since_part",
-                "/since_parts_90/0",
-                "/since_parts_90/1",
-                "/reported_at_part",
-                "/verdict",
-                "/accepted",
-                "/decided",
-            ]
-            .map(|pointer| change.pointer(pointer).map(plain).unwrap_or_default());
-            let of_cause = ["/kind", "/share", "/parameter", "/delta", "/interval_95/0", "/interval_95/1", "/unit"]
-                .map(|pointer| cause.pointer(pointer).map(plain).unwrap_or_default());
-            let _ = writeln!(text, "{},{}", of_change.join(","), of_cause.join(","));
-        }
+        let causes = change["causes"].as_array().into_iter().flatten();
+        lines.extend(causes.map(|cause| cells(CHANGE, change).chain(cells(CAUSE, cause)).collect()));
     }
-    text
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_label_with_a_comma_stays_one_cell_and_runs_nowhere() {
+        let size =
+            |label: &str| json!({ "kind": "batch_level", "label": label, "delta": 0.5, "interval_95": [0.25, 1] });
+        let state = json!({ "model": { "sizes": [size("bar = A, insert = 2"), size("=cmd|'/C calc'!A1")] } });
+        let text = csv_lines(model(Some(&state)));
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("cause,label,parameter,unit,since_part,form,delta,lower,upper"));
+        assert_eq!(lines.next(), Some("batch_level,\"bar = A, insert = 2\",,,,,0.5,0.25,1"));
+        assert_eq!(lines.next(), Some("batch_level,'=cmd|'/C calc'!A1,,,,,0.5,0.25,1"));
+        assert_eq!(lines.next(), None);
+    }
 }
