@@ -98,7 +98,14 @@ fn missing_field(pointer: &str, name: &str, node: &Value) -> Finding {
     let tag = node.get("x-tag").and_then(Value::as_str) == Some(name);
     let mut finding = Finding::new(if tag { "missing_kind" } else { "missing_field" }, child(pointer, name));
     finding.unit = unit_of(field);
-    with_options(with_range(finding, field), field.get("enum"))
+    with_kinds(with_options(with_range(finding, field), field.get("enum")), field)
+}
+
+/// Of an object that is of one of several kinds: which there are, and the field that says it.
+fn with_kinds(finding: Finding, union: &Value) -> Finding {
+    let Some(tag) = union.get("x-tag").and_then(Value::as_str) else { return finding };
+    let kinds = union.get("properties").and_then(|properties| properties.get(tag)?.get("enum"));
+    with_options(finding.with("tag", tag.to_owned()), kinds)
 }
 
 /// The schema of the tagged union whose tag stands at `place`, if it is one.
@@ -138,6 +145,7 @@ fn wrong_type(pointer: &str, received: &Value, node: &Value) -> Finding {
         _ => Vec::new(),
     };
     let numeric_expected = expected.iter().any(|kind| kind == "number" || kind == "integer");
+    let text_expected = expected.iter().any(|kind| kind == "string");
     let mut finding = coded("wrong_type", pointer, node)
         .with("expected", expected)
         .with("received_type", type_name(received))
@@ -148,7 +156,10 @@ fn wrong_type(pointer: &str, received: &Value, node: &Value) -> Finding {
     if numeric_expected && quoted {
         finding = finding.with("quoted_number", "yes");
     }
-    with_range(finding, node)
+    if text_expected && received.is_number() {
+        finding = finding.with("in_quotes", received.to_string());
+    }
+    with_kinds(with_range(finding, node), node)
 }
 
 fn out_of_range(pointer: &str, received: &Value, limit: &Value, node: &Value) -> Finding {

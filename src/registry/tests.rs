@@ -154,6 +154,7 @@ fn every_rule_of_a_schema_has_its_code_and_its_words() {
         (json!({"type": "number", "exclusiveMaximum": 0, "minimum": -1, "x-unit": "mm"}), json!(0), "out_of_range"),
         (json!({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}), json!(7), "out_of_range"),
         (json!({"type": ["number", "null"]}), json!("x"), "wrong_type"),
+        (json!({"type": "string"}), json!(3), "wrong_type"),
     ];
     for (schema, value, code) in cases {
         let schema = json!({"type": "object", "properties": {"field": schema}});
@@ -164,6 +165,8 @@ fn every_rule_of_a_schema_has_its_code_and_its_words() {
         assert_eq!((finding.code, finding.pointer.as_str()), (code, "/field"));
         let words = Texts::shared().try_finding(Language::En, "fault", finding).unwrap();
         assert!(words.contains("field") && !words.contains("  "), "{words}");
+        let is_number_for_text = code == "wrong_type" && value.is_number();
+        assert_eq!(words.ends_with("write it in quotes: \"3\""), is_number_for_text, "{words}");
     }
 }
 

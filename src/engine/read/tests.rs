@@ -112,6 +112,14 @@ fn every_fault_is_listed_at_once_at_its_own_place() {
 }
 
 #[test]
+fn who_writes_a_word_in_place_of_an_object_is_told_its_kinds() {
+    let told = |finding: &Finding| Texts::shared().finding(Language::En, "fault", finding);
+    let finding = only(&with("steady", json!("soft")));
+    assert_eq!(finding.code, "wrong_type");
+    assert!(told(&finding).contains("expected object with kind, one of "), "{}", told(&finding));
+}
+
+#[test]
 fn a_field_may_have_a_code_of_its_own() {
     assert!(faults(&with("length_mm", json!(0))).contains(&("toy_bad_length", "/length_mm".to_owned())));
     let finding = only(&with("length_mm", json!("500")));
