@@ -22,7 +22,7 @@ pub(super) fn fill(room: Room, calculator: &str, views: &Views<'_>, writer: &mut
     if let Some(machine) = &views.machine {
         if room != Room::Program {
             // How a program is to be read is said with it, and never guessed.
-            control(machine, writer);
+            control(room, machine, writer);
         }
         travel(room, machine, writer);
         model(calculator, machine, writer);
@@ -247,13 +247,12 @@ fn say_carriage(views: &Views<'_>, parts: &[Part], writer: &mut Writer<'_>) {
     writer.explain(message);
 }
 
-fn control(machine: &View<'_>, writer: &mut Writer<'_>) {
-    if let Some((increment, part)) = machine.number("/control/increment_um") {
-        // A schedule has an increment only with a compensated path.
-        let pointer = if writer.job().get("zones").is_some() { "/compensation" } else { "/path" };
-        if pointer == "/path" || writer.at(pointer).is_some() {
-            writer.offer(&format!("{pointer}/increment_um"), increment, vec![part]);
-        }
+fn control(room: Room, machine: &View<'_>, writer: &mut Writer<'_>) {
+    // A schedule has an increment only with a compensated path.
+    let of_schedule = || writer.at("/compensation").map(|_| "/compensation/increment_um");
+    let pointer = if room == Room::Schedule { of_schedule() } else { Some("/path/increment_um") };
+    if let (Some(pointer), Some((increment, part))) = (pointer, machine.number("/control/increment_um")) {
+        writer.offer(pointer, increment, vec![part]);
     }
     if let Some((dialect, part)) = machine.word("/control/dialect") {
         writer.offer("/program/dialect", dialect.to_owned(), vec![part]);
