@@ -442,6 +442,35 @@ fn what_the_calculators_utter_has_a_text_and_their_examples_run() {
     }
 }
 
+#[test]
+fn records_fill_in_fields_that_the_job_has() {
+    let registry = Registry::standard().unwrap();
+    let faults = |calculator: &str, job: &Value| match check_now(
+        &registry,
+        calculator,
+        Body::Json(job.to_string().into()),
+        &Given::default(),
+    ) {
+        Err(Error::Invalid { findings, .. }) => findings,
+        other => panic!("a job with a shaft alone: {other:?}"),
+    };
+    let beside =
+        json!({ "shaft": { "segments": [{ "length_mm": 100, "diameter_mm": 40 }] }, "force": { "kind": "kienzle" } });
+    for calculator in ["deflection-compensation", "feed-schedule", "program-compensation", "milling-stability"] {
+        let before: Vec<String> = faults(calculator, &beside).into_iter().map(|fault| fault.pointer).collect();
+        for kind in precut_library::Kind::NAMED {
+            for record in precut_library::built_in::records(kind).iter().step_by(5) {
+                let mut job = beside.clone();
+                job[kind.name()] = json!(record.name);
+                let of_schema = |fault: &Finding| matches!(fault.code, "unknown_field" | "wrong_type" | "out_of_range");
+                let new =
+                    faults(calculator, &job).into_iter().find(|own| of_schema(own) && !before.contains(&own.pointer));
+                assert!(new.is_none(), "{calculator} with {} {}: {new:?}", kind.name(), record.name);
+            }
+        }
+    }
+}
+
 /// Names that the job or the library gives (`names`) stay as they are.
 fn in_its_language(language: Language, said: &str, names: &str) {
     if language != Language::En {

@@ -55,6 +55,8 @@ pub const FAULT_CODES: &[&str] = &[
     "material_without_force_law",
     "name_or_codes_missing",
     "no_minor_edge_clearance",
+    "no_recommended_feed",
+    "no_recommended_speed",
     "passive_force_missing",
     "several_preferred_rows",
     "stiffness_meaning_missing",

@@ -167,7 +167,8 @@ fn fill_model(pointer: &str, model: &Value, part: &Part, writer: &mut Writer<'_>
 fn limits(views: &Views<'_>, writer: &mut Writer<'_>) {
     let cut = writer.take("", "cut_kind").and_then(|word| word.as_str().map(str::to_owned));
     let (Some(tool), Some(material)) = (&views.tool, views.material_of_force()) else { return };
-    if let Some((index, row)) = recommended(tool, cut.as_deref(), material) {
+    let feeds = recommended(tool, cut.as_deref(), material);
+    if let Some((index, row)) = feeds {
         for (field, name) in
             [("feed_min_mm_per_rev", "feed_low_mm_per_rev"), ("feed_max_mm_per_rev", "feed_high_mm_per_rev")]
         {
@@ -180,9 +181,53 @@ fn limits(views: &Views<'_>, writer: &mut Writer<'_>) {
             }
         }
     }
-    if let Some((index, row)) = speeds(tool, cut.as_deref(), material) {
+    let speeds = speeds(tool, cut.as_deref(), material);
+    if let Some((index, row)) = speeds {
         speed_limits(row, &format!("/cutting_speeds/{index}"), views, writer);
     }
+    // The base of a diagnosis cuts nothing, and needs neither.
+    if writer.at("/zones").is_none() {
+        return;
+    }
+    let is_chosen = |row: &Value| row.get("cut").and_then(Value::as_str) == cut.as_deref();
+    let chooses_nothing = cut.is_some() && !speeds.is_some_and(|(_, row)| is_chosen(row));
+    let lacks = |[least, most]: [&str; 2]| [least, most].iter().any(|at| writer.at(at).is_none());
+    let no_feeds = lacks(["/limits/feed_min_mm_per_rev", "/limits/feed_max_mm_per_rev"]) || chooses_nothing;
+    let no_speeds = lacks(["/limits/speed_min_m_per_min", "/limits/speed_max_m_per_min"]);
+    if feeds.is_none() && no_feeds {
+        writer.fault(no_recommended_feed(tool, cut, material));
+    }
+    if speeds.is_none() && no_speeds {
+        writer.fault(no_recommended_speed(tool, material));
+    }
+}
+
+/// Nothing says between which feeds the tool cuts, or the kind of cut that is asked for is none of those it has feeds for.
+fn no_recommended_feed(tool: &View<'_>, cut: Option<String>, material: &View<'_>) -> Finding {
+    let group = material.text("iso513_group");
+    let rows = tool.rows("recommended").iter();
+    let of_group = rows.filter(|row| row.get("iso513_group").and_then(Value::as_str) == group);
+    let finding = Finding::new("no_recommended_feed", "/cut_kind").with("tool", tool.name().to_owned());
+    let finding = with_words(finding, of_group, "cut");
+    let finding = group.into_iter().fold(finding, |finding, group| finding.with("group", group.to_owned()));
+    cut.into_iter().fold(finding, |finding, cut| finding.with("received", cut))
+}
+
+/// Nothing says how fast such a tool cuts the material.
+fn no_recommended_speed(tool: &View<'_>, material: &View<'_>) -> Finding {
+    let rows = material.rows("cutting_speeds").iter();
+    let of_turning = rows.filter(|row| row.get("operation").and_then(Value::as_str) == Some("turning"));
+    let finding = Finding::new("no_recommended_speed", format!("{}/speed_tool", tool.pointer))
+        .with("material", material.name().to_owned());
+    with_words(finding, of_turning, "tool")
+}
+
+/// What rows have in a field, each word once, as what can be chosen; left out where there is nothing.
+fn with_words<'v>(finding: Finding, rows: impl Iterator<Item = &'v Value>, field: &str) -> Finding {
+    let mut words: Vec<String> = rows.filter_map(|row| row.get(field)?.as_str().map(str::to_owned)).collect();
+    words.sort();
+    words.dedup();
+    if words.is_empty() { finding } else { finding.with("allowed", words) }
 }
 
 fn row_part(from: From, row: &Value, path: &str, value: f64) -> Part {

@@ -183,6 +183,43 @@ fn limits_that_do_not_meet_tell_the_diameter_that_would_do() {
 }
 
 #[test]
+fn a_schedule_without_a_range_is_told_what_there_is() {
+    let schedule = |change: Value| {
+        let mut job = json!({
+            "tool": "cnmg120408_pclnr2525m12", "material": "34crmo4",
+            "zones": [{"id": "a", "z_start_mm": 0, "z_end_mm": 50, "depth_mm": 1, "diameter_mm": 60}],
+        });
+        change.as_object().unwrap().iter().for_each(|(name, value)| job[name] = value.clone());
+        named("feed-schedule", &mut job).faults
+    };
+    let limits = json!({"feed_min_mm_per_rev": 0.1, "feed_max_mm_per_rev": 0.3, "speed_min_m_per_min": 100, "speed_max_m_per_min": 200});
+    for (change, codes) in [
+        (json!({}), vec!["no_recommended_feed", "no_recommended_speed"]),
+        (json!({"cut_kind": "slow"}), vec!["no_recommended_feed", "no_recommended_speed"]),
+        (json!({"cut_kind": "slow", "limits": limits}), vec!["no_recommended_feed"]),
+        (json!({"tool": {"insert": "CNMG120408", "holder": "PCLNL2525M12"}, "limits": limits}), vec![]),
+        (json!({"cut_kind": "medium"}), vec![]),
+    ] {
+        let faults = schedule(change.clone());
+        assert_eq!(faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), codes, "{change}");
+        // What is told can be chosen.
+        for fault in &faults {
+            for word in words(fault, "allowed") {
+                let chosen = match fault.code {
+                    "no_recommended_feed" => json!({"cut_kind": word}),
+                    _ => json!({"tool": {"name": "cnmg120408_pclnr2525m12", "speed_tool": word}, "cut_kind": "medium"}),
+                };
+                assert!(schedule(chosen.clone()).iter().all(|left| left.code != fault.code), "{chosen}");
+            }
+        }
+    }
+    assert_eq!(
+        named("feed-schedule", &mut json!({"tool": "cnmg120408_pclnr2525m12", "material": "34crmo4"})).faults,
+        []
+    );
+}
+
+#[test]
 fn what_a_job_says_over_a_record_is_checked() {
     for (tool, code, pointer) in [
         (json!({"name": "bar_a25_pclnr12"}), "missing_field", "/tool/overhang_mm"),
