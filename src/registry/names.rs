@@ -14,8 +14,9 @@ pub(crate) fn takes(calculator: &str, kind: Kind) -> bool {
 }
 
 /// What belongs to names elsewhere in a job; `*` are the items of a list.
-const BESIDE: [&[&str]; 11] = [
+const BESIDE: [&[&str]; 12] = [
     &["supports", "*", "rest"],
+    &["cutter", "name"],
     &["tools", "*", "name"],
     &["tools", "*", "insert"],
     &["tools", "*", "holder"],
@@ -113,6 +114,11 @@ fn beside(component: &str) -> Vec<(&'static str, Value)> {
                     "description": "Designation of the holder, ISO 5608, or of the bar, ISO 6261: it gives the angles." }),
             ),
         ],
+        "MillCutter" => vec![(
+            "name",
+            json!({ "type": "string", "maxLength": 100, "example": "endmill_12_z4_r1", "x-group": "cut",
+                "description": "A cutter by name: its record gives diameter, teeth, helix and cutting edge angle." }),
+        )],
         "SupportSteadyRest" | "SupportFollowRest" => vec![(
             "rest",
             json!({ "type": "string", "maxLength": 64, "example": "steady", "x-group": "machine", "x-advanced": true,
@@ -127,7 +133,7 @@ fn filled(component: &str) -> &'static [&'static str] {
     match component {
         "ForceModelKienzle" => &["cutting_edge_angle_deg", "specific_normal_force_n_per_mm2", "normal_exponent"],
         "ForceModelHandbook" => &["cutting_edge_angle_deg"],
-        "FaceMill" => &["diameter_mm", "teeth"],
+        "FaceMill" | "MillCutter" => &["diameter_mm", "teeth"],
         "MillingForce" => &["coefficient"],
         "ProgramTool" => &["nose_radius_mm", "cutting_edge_angle_deg", "minor_edge_angle_deg"],
         "RingForceLaw" => &[

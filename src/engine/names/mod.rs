@@ -113,17 +113,30 @@ fn asked_by_points(registry: &Registry, study: &Value) -> Vec<Asked> {
     let variables = study.get("vary").and_then(Value::as_array);
     for variable in variables.into_iter().flatten() {
         let Some(pointer) = variable.get("pointer").and_then(Value::as_str) else { continue };
-        let last = pointer.rsplit('/').find(|token| *token != "name");
-        let Some(kind) = Kind::NAMED.into_iter().find(|kind| last == Some(kind.name())) else { continue };
         let values = variable.get("values").and_then(Value::as_array).into_iter().flatten();
-        for name in values.filter_map(Value::as_str) {
-            let Some((_, of)) = place(entry, job) else { continue };
-            found.extend(precut_library::asked(&of, &serde_json::json!({ kind.name(): name })));
+        let Some((path, of)) = place(entry, job) else { continue };
+        let Some(pointer) = path.iter().try_fold(pointer, |rest, name| rest.strip_prefix('/')?.strip_prefix(name))
+        else {
+            continue;
+        };
+        for name in values.filter(|value| value.is_string()) {
+            found.extend(precut_library::asked(&of, &with(within(job, &path), pointer, name)));
         }
     }
     found.sort_by(|one, other| (one.kind, &one.name, one.revision).cmp(&(other.kind, &other.name, other.revision)));
     found.dedup_by(|one, other| (one.kind, &one.name, one.revision) == (other.kind, &other.name, other.revision));
     found
+}
+
+/// The field of a job that a pointer leads into, with a value at the pointer.
+fn with(job: Option<&Value>, pointer: &str, value: &Value) -> Value {
+    let field = pointer.split('/').nth(1).unwrap_or_default();
+    let mut part = serde_json::json!({ field: job.and_then(|job| job.get(field)) });
+    let path: Vec<String> = pointer.split('/').skip(1).map(str::to_owned).collect();
+    if let Some(target) = super::table::place_at(&mut part, &path) {
+        *target = value.clone();
+    }
+    part
 }
 
 /// The model that the machine of a job brings along, by its calculator, where the job does not say one itself.

@@ -36,9 +36,9 @@ pub fn asked(calculator: &str, job: &Value) -> Vec<Asked> {
             _ => {}
         }
     }
-    for (index, tool) in turret(room, job).iter().enumerate() {
-        if let Some(Value::String(name)) = tool.get("name") {
-            push(Kind::Tool, format!("/tools/{index}/name"), name, &mut found);
+    for place in tools(room, job) {
+        if let Some(Value::String(name)) = job.pointer(&place).and_then(|tool| tool.get("name")) {
+            push(Kind::Tool, format!("{place}/name"), name, &mut found);
         }
     }
     for part in [room.work(), "force"] {
@@ -50,10 +50,16 @@ pub fn asked(calculator: &str, job: &Value) -> Vec<Asked> {
     found
 }
 
-/// The tools of a job that has several.
-pub(super) fn turret(room: Room, job: &Value) -> &[Value] {
-    let tools = job.get("tools").filter(|_| room == Room::Program);
-    tools.and_then(Value::as_array).map_or(&[], Vec::as_slice)
+/// The places of the tools that a job names where it describes them.
+pub(super) fn tools(room: Room, job: &Value) -> Vec<String> {
+    match room {
+        Room::Program => {
+            let count = job.get("tools").and_then(Value::as_array).map_or(0, Vec::len);
+            (0..count).map(|index| format!("/tools/{index}")).collect()
+        }
+        Room::Cutter => vec!["/cutter".to_owned()],
+        _ => Vec::new(),
+    }
 }
 
 /// Whether the material of a part is for the library: not where the calculator knows it itself.

@@ -40,9 +40,9 @@ pub(super) fn fill(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
 
 /// The edges of the tools of a turret.
 pub(super) fn turret(views: &Views<'_>, writer: &mut Writer<'_>) {
-    for (index, tool) in &views.turret {
+    for tool in &views.described {
         for field in ["nose_radius_mm", "cutting_edge_angle_deg", "minor_edge_angle_deg"] {
-            let pointer = format!("/tools/{index}/{field}");
+            let pointer = format!("{}/{field}", tool.pointer);
             if let Some((value, part)) = of_tool(tool, field, &pointer, writer) {
                 writer.offer(&pointer, value, vec![part]);
             }

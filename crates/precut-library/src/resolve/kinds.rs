@@ -15,6 +15,8 @@ pub(super) enum Room {
     Schedule,
     /// A cutter and a spindle.
     Milling,
+    /// The same in three directions: its cutter is named where it stands.
+    Cutter,
     /// A ring: its material alone.
     Ring,
     /// A program with its blank and the tools of its turret.
@@ -29,7 +31,8 @@ impl Room {
             "feed-schedule" => Some(Self::Schedule),
             "program-compensation" => Some(Self::Program),
             "ring-roundness" => Some(Self::Ring),
-            "fixture-stability" | "milling-stability" => Some(Self::Milling),
+            "fixture-stability" => Some(Self::Milling),
+            "milling-stability" => Some(Self::Cutter),
             _ => None,
         }
     }
@@ -38,8 +41,8 @@ impl Room {
     pub(super) fn takes(self, kind: Kind) -> bool {
         match self {
             Self::Ring => kind == Kind::Material,
-            // Its tools stand in a list.
-            Self::Program => kind != Kind::Tool,
+            // Tools have a place of their own there: `edges`.
+            Self::Program | Self::Cutter => kind != Kind::Tool,
             _ => true,
         }
     }
@@ -51,9 +54,9 @@ impl Room {
 
     fn kinds(self, kind: Kind) -> &'static [&'static str] {
         match (self, kind) {
-            (Self::Milling, Kind::Machine) => &["mill"],
+            (Self::Milling | Self::Cutter, Kind::Machine) => &["mill"],
             (_, Kind::Machine) => &["lathe"],
-            (Self::Milling, Kind::Tool) => &["milling_indexable", "milling_solid"],
+            (Self::Milling | Self::Cutter, Kind::Tool) => &["milling_indexable", "milling_solid"],
             (_, Kind::Tool) => &["turning_external", "boring_bar"],
             (_, Kind::Material | Kind::Part) => &[],
         }
@@ -74,7 +77,7 @@ pub(super) fn check(room: Room, views: &Views<'_>, writer: &mut Writer<'_>) {
             );
         }
     }
-    if matches!(room, Room::Milling | Room::Ring) {
+    if matches!(room, Room::Milling | Room::Cutter | Room::Ring) {
         return;
     }
     let Some(tool) = &views.tool else { return };

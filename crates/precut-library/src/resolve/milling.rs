@@ -3,38 +3,38 @@
 use precut_calc::calculator::Finding;
 use serde_json::{Value, json};
 
+use super::kinds::Room;
 use super::origin::{From, Part};
 use super::view::{View, Views};
 use super::writer::Writer;
 use super::{schedule, turning};
 use crate::kienzle::{self, Choice};
 
-pub(super) fn fill(calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>) {
+pub(super) fn fill(room: Room, calculator: &str, views: &Views<'_>, writer: &mut Writer<'_>) {
     if let Some(machine) = &views.machine {
-        spindle(calculator, machine, writer);
+        spindle(room, machine, writer);
         turning::model(calculator, machine, writer);
     }
-    if let Some(tool) = &views.tool {
-        for field in ["diameter_mm", "teeth"] {
+    let fields = ["diameter_mm", "teeth", "helix_angle_deg", "cutting_edge_angle_deg"];
+    let fields = if room == Room::Cutter { &fields[..] } else { &fields[..2] };
+    for tool in views.tools() {
+        for field in fields {
             if let Some((value, part)) = tool.number(&format!("/{field}")) {
-                let value: Value = if field == "teeth" { whole(value) } else { value.into() };
+                let value: Value = if *field == "teeth" { whole(value) } else { value.into() };
                 writer.offer(&format!("/cutter/{field}"), value, vec![part]);
             }
         }
     }
     if let Some(material) = views.material_of_force() {
         // There a law is one of several.
-        if calculator == THREE_DIRECTIONS && writer.at("/force/kind").is_none() {
+        if room == Room::Cutter && writer.at("/force/kind").is_none() {
             writer.put("/force/kind", json!("power_law"));
         }
-        if calculator != THREE_DIRECTIONS || writer.at("/force/kind") == Some(&json!("power_law")) {
+        if room != Room::Cutter || writer.at("/force/kind") == Some(&json!("power_law")) {
             force(material, writer);
         }
     }
 }
-
-/// The calculator whose jobs say by which law an edge cuts, and how fast a spindle turns.
-const THREE_DIRECTIONS: &str = "milling-stability";
 
 /// Where a machine states its fastest speed.
 const FASTEST: &str = "/spindle/speed_max_rpm";
@@ -44,7 +44,7 @@ fn whole(value: f64) -> Value {
     serde_json::from_str(&format!("{value:.0}")).unwrap_or_else(|_| json!(value))
 }
 
-fn spindle(calculator: &str, machine: &View<'_>, writer: &mut Writer<'_>) {
+fn spindle(room: Room, machine: &View<'_>, writer: &mut Writer<'_>) {
     if let Some((value, part)) = machine.number("/spindle/efficiency") {
         writer.offer("/spindle/efficiency", value, vec![part]);
     }
@@ -66,7 +66,7 @@ fn spindle(calculator: &str, machine: &View<'_>, writer: &mut Writer<'_>) {
         }
     }
     let Some((limit, part)) = machine.number(FASTEST) else { return };
-    if calculator == THREE_DIRECTIONS {
+    if room == Room::Cutter {
         writer.offer("/spindle/speed_max_rpm", limit, vec![part]);
     }
     if let Some(speed) = writer.number("/cut/spindle_speed_rpm").filter(|speed| *speed > limit) {

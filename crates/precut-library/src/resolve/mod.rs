@@ -198,7 +198,7 @@ pub fn resolve(calculator: &str, job: &mut Value, found: &[(Asked, Lookup)]) -> 
             force::fill(room, &views, &mut writer);
         }
         kinds::Room::Ring => force::ring(&views, &mut writer),
-        kinds::Room::Milling => milling::fill(calculator, &views, &mut writer),
+        kinds::Room::Milling | kinds::Room::Cutter => milling::fill(room, calculator, &views, &mut writer),
     }
     writer.into_resolution()
 }

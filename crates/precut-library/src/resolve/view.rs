@@ -3,7 +3,7 @@
 use precut_calc::calculator::Finding;
 use serde_json::{Map, Value};
 
-use super::asked::turret;
+use super::asked::tools;
 use super::kinds::Room;
 use super::origin::{From, Part};
 use super::writer::Writer;
@@ -94,8 +94,8 @@ impl<'a> View<'a> {
 pub(super) struct Views<'a> {
     pub(super) machine: Option<View<'a>>,
     pub(super) tool: Option<View<'a>>,
-    /// Those of a turret that have a record or codes, with their places in it.
-    pub(super) turret: Vec<(usize, View<'a>)>,
+    /// Those that the job names where it describes them, as far as they have a record or codes.
+    pub(super) described: Vec<View<'a>>,
     /// The material of the whole job.
     material: Option<View<'a>>,
     /// The material of what is turned alone.
@@ -109,8 +109,9 @@ impl<'a> Views<'a> {
     pub(super) fn take(room: Room, writer: &mut Writer<'_>, found: &'a [(Asked, Lookup)]) -> Option<Self> {
         let mut views = Self::default();
         let tool_by_codes = is_by_codes(writer.job().get("tool"));
-        let of_turret = turret(room, writer.job()).iter().any(|tool| is_by_codes(Some(tool)));
-        if found.is_empty() && !tool_by_codes && !of_turret {
+        let described = tools(room, writer.job());
+        let has_codes = described.iter().any(|place| is_by_codes(writer.at(place)));
+        if found.is_empty() && !tool_by_codes && !has_codes {
             return None;
         }
         for (asked, lookup) in found {
@@ -118,7 +119,7 @@ impl<'a> Views<'a> {
             let record = resource.map(|resource| resource.record.as_ref());
             match asked.pointer.as_str() {
                 // In their places further down.
-                _ if room == Room::Program && asked.kind == Kind::Tool => {}
+                _ if asked.kind == Kind::Tool && !room.takes(Kind::Tool) => {}
                 "/shaft/material" | "/stock/material" | "/force/material" => {
                     let (part, _) = asked.pointer.rsplit_once('/').unwrap_or_default();
                     writer.take(part, "material");
@@ -140,18 +141,18 @@ impl<'a> Views<'a> {
             let over = taken(room, Kind::Tool, writer);
             views.tool = Some(View::new(Kind::Tool, "/tool".to_owned(), None, over));
         }
-        for index in 0..turret(room, writer.job()).len() {
-            let pointer = format!("/tools/{index}");
+        for pointer in described {
             let place = format!("{pointer}/name");
             writer.take(&pointer, "name");
-            let codes = ["insert", "holder"].map(|code| (code, writer.take(&pointer, code)));
-            let over: Map<String, Value> =
-                codes.into_iter().filter_map(|(code, value)| Some((code.to_owned(), value?))).collect();
+            // Mills have no code of their own.
+            let codes: &[&str] = if room == Room::Program { &["insert", "holder"] } else { &[] };
+            let codes = codes.iter().map(|code| (*code, writer.take(&pointer, code)));
+            let over: Map<String, Value> = codes.filter_map(|(code, value)| Some((code.to_owned(), value?))).collect();
             let of_name = found.iter().find(|(asked, _)| asked.pointer == place);
             let resource = of_name.and_then(|(asked, lookup)| looked_up(asked, lookup, writer));
             if resource.is_some() || !over.is_empty() {
                 let record = resource.map(|resource| resource.record.as_ref());
-                views.turret.push((index, View::new(Kind::Tool, pointer, record, Value::Object(over))));
+                views.described.push(View::new(Kind::Tool, pointer, record, Value::Object(over)));
             }
         }
         for tool in views.tools() {
@@ -168,7 +169,7 @@ impl<'a> Views<'a> {
 
     /// All tools of the job.
     pub(super) fn tools(&self) -> impl Iterator<Item = &View<'a>> {
-        self.tool.iter().chain(self.turret.iter().map(|(_, view)| view))
+        self.tool.iter().chain(&self.described)
     }
 
     /// Where a record that a job names has its place.

@@ -344,8 +344,14 @@ fn milling_gets_cutter_spindle_and_force() {
 /// There the law is one of several, and a spindle says how fast it turns.
 #[test]
 fn milling_in_three_directions_gets_a_law_and_the_fastest_speed() {
-    let mut job = json!({"machine": "hmc_bt50", "tool": "face_100_z7_sekt12", "material": "42CrMo4", "cut": {}});
+    let modes = json!({"kind": "modes", "modes": []});
+    let cutter = json!({"name": "face_100_z7_sekt12", "teeth": 5});
+    let mut job = json!({"machine": "hmc_bt50", "cutter": cutter, "tool": modes, "material": "42CrMo4", "cut": {}});
     faultless("milling-stability", &mut job);
+    assert_eq!(job["tool"], modes, "what yields of the tool is the job's");
+    assert_eq!(job["cutter"]["teeth"], json!(5), "the job's own");
+    assert_eq!(job["cutter"]["diameter_mm"], json!(100.0));
+    assert_eq!(job["cutter"]["cutting_edge_angle_deg"], json!(45.0));
     assert_eq!(job["force"]["kind"], json!("power_law"));
     assert_eq!(job["force"]["coefficient"], json!(2526.0));
     assert!(job["spindle"]["speed_max_rpm"].as_f64().is_some_and(|speed| speed > 1000.0));
