@@ -109,6 +109,7 @@ fn what_acts_by_default_is_what_matters_and_the_switches_written_out_give_the_sa
         assert_eq!(same.stations, found.stations, "{number}");
         // A switch that is said holds.
         let mut off = job.clone();
+        off["detail"] = json!("profile");
         for effect in EFFECTS {
             switch(&mut off, effect, false);
         }
@@ -141,6 +142,7 @@ fn the_support_that_is_advised_gives_the_form_error_that_was_told() {
         let Some(advised) = &found.one_more_rest else { continue };
         let kind = serde_json::to_value(advised.kind).unwrap();
         let mut taken = job.clone();
+        taken["detail"] = json!("profile");
         taken["supports"]
             .as_array_mut()
             .unwrap()

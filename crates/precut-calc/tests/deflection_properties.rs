@@ -274,9 +274,11 @@ fn paper(rest: Option<Value>) -> Value {
 
 /// Largest change of the diameter along the nominal line.
 fn change_um(job: &Value, change: impl Fn(&mut Value)) -> f64 {
+    let mut job = job.clone();
+    job["detail"] = json!("profile");
     let mut other = job.clone();
     change(&mut other);
-    let (before, after) = (solved(job.clone()).stations, solved(other).stations);
+    let (before, after) = (solved(job).stations, solved(other).stations);
     let pairs = before.diameter_error_uncompensated_um.iter().zip(&after.diameter_error_uncompensated_um);
     pairs.map(|(a, b)| (a.unwrap() - b.unwrap()).abs()).fold(0.0, f64::max)
 }
