@@ -15,6 +15,7 @@ use crate::feed_schedule::answer::output::{Outcome, ScheduleConformance, Schedul
 use crate::feed_schedule::job::case::{Case, ZoneCase};
 use crate::feed_schedule::job::input::Job;
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::of_fit;
 use crate::feed_schedule::job::open::{Given, Move, MovedResults, OpenModels};
 
 /// A share below this is not told.
@@ -159,10 +160,9 @@ pub(in crate::feed_schedule) fn scatter(
     depth_mm: f64,
 ) -> Option<Scatter> {
     let model = job.models.get(output);
-    let of_fit = model.and_then(|model| model.coefficient_covariance.as_ref());
-    let mut coefficients = of_fit.and_then(|covariance| {
-        let matrix = covariance.as_matrix()?;
-        let factors = covariance.factors(depth_mm, job.cutting_edge_angle_deg);
+    let covariance = model.and_then(|model| model.coefficient_covariance.as_ref());
+    let mut coefficients = covariance.and_then(|covariance| {
+        let (matrix, factors) = (covariance.as_matrix()?, of_fit::factors(job, output, depth_mm)?);
         let mut form = [[0.0; 3]; 3];
         for (i, by) in factors.iter().enumerate() {
             for (j, with) in factors.iter().enumerate() {
@@ -179,7 +179,7 @@ pub(in crate::feed_schedule) fn scatter(
         }
     }
     let residual = model.and_then(|model| model.residual_scatter).unwrap_or(0.0);
-    let degrees = of_fit.and_then(|covariance| covariance.degrees_of_freedom);
+    let degrees = covariance.and_then(|covariance| covariance.degrees_of_freedom);
     let log_log = model.is_none_or(|model| model.form == ModelForm::LogLog);
     let scatter = Scatter { residual, coefficients, bent: bent.into(), degrees, log_log };
     (residual > 0.0 || scatter.bends()).then_some(scatter)
@@ -362,17 +362,14 @@ fn joint(job: &Job, open: &OpenModels, part: &[Kept]) -> Result<f64, Failure> {
         return Ok(part.iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp());
     }
     let sizes = lowers.each_ref().map(|lower| lower.as_ref().map_or(0, DMatrix::nrows));
-    let moved = |kept: &Kept, scores: &[f64]| -> f64 {
+    let factors: Vec<_> =
+        part.iter().map(|kept| of_fit::factors(job, kept.output, kept.depth_mm).unwrap_or_default()).collect();
+    let moved = |kept: &Kept, factors: &[[f64; 3]], scores: &[f64]| -> f64 {
         let output = kept.output as usize;
         let Some(lower) = &lowers[output] else { return 0.0 };
         let from: usize = sizes[..output].iter().sum();
-        let Some(covariance) = job.models.get(kept.output).and_then(|model| model.coefficient_covariance.as_ref())
-        else {
-            return 0.0;
-        };
         let off = lower * DVector::from_column_slice(&scores[from..from + sizes[output]]);
         let (u, x) = kept.at;
-        let factors = covariance.factors(kept.depth_mm, job.cutting_edge_angle_deg);
         factors.iter().zip(off.iter()).map(|(by, off)| (by[0] + by[1] * u + by[2] * x) * off).sum()
     };
     let given = part.iter().map(|kept| Given { output: kept.output, at: kept.at, depth_mm: kept.depth_mm }).collect();
@@ -384,10 +381,11 @@ fn joint(job: &Job, open: &OpenModels, part: &[Kept]) -> Result<f64, Failure> {
         let by_effects = by_effects.at(&scores[of_coefficients..])?;
         sum += part
             .iter()
+            .zip(&factors)
             .zip(by_effects)
-            .map(|(kept, by_effects)| {
+            .map(|((kept, factors), by_effects)| {
                 let residual = job.models.get(kept.output).and_then(|model| model.residual_scatter).unwrap_or(0.0);
-                let left = kept.beyond - moved(kept, &scores) - by_effects;
+                let left = kept.beyond - moved(kept, factors, &scores) - by_effects;
                 if residual > 0.0 { 1.0 - normal_tail(left / residual) } else { f64::from(u8::from(left >= 0.0)) }
             })
             .product::<f64>();
