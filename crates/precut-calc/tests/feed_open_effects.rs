@@ -147,13 +147,14 @@ fn parts_of_a_posterior_keep_their_limits_as_often_as_said() {
         let share = |count: u32| f64::from(count) / f64::from(DRAWS);
         let joint = number(told, "/joint_probability");
         eprintln!("{}: told {joint:.4}, kept {:.4}", job["risk"]["kind"], share(all));
-        // Three deviations of 20,000 draws are 0.007; what bends is told by its slope at the schedule.
+        // Three deviations of 20,000 draws are 0.007.
         assert!((share(all) - joint).abs() < 0.01, "told {joint}, kept {}", share(all));
         for (place, name) in ["roughness", "deflection"].iter().enumerate() {
             let worst = told["limits"].as_array().unwrap().iter().find(|one| one["limit"] == *name).unwrap();
             let least = kept.iter().map(|zone| share(zone[place])).fold(1.0, f64::min);
             eprintln!("    {name}: told {worst}, kept {least:.4}");
-            assert!((least - number(worst, "/probability")).abs() < 0.01, "{worst}, kept {least}");
+            // What bends is told as it is drawn: of 20,000 draws three deviations are 0.005 at 0.95.
+            assert!((least - number(worst, "/probability")).abs() < 0.005, "{worst}, kept {least}");
         }
         if job["risk"]["kind"] == "joint" {
             // Boole's bound keeps more than is asked.
