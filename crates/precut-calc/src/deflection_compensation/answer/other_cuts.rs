@@ -12,7 +12,7 @@ use crate::certainty::{Improvement, ImprovingAction, JointlyKept};
 use crate::diameters::Judged;
 
 use crate::deflection_compensation::answer::advice::held_more;
-use crate::deflection_compensation::answer::aimed::cuts_at_aim;
+use crate::deflection_compensation::answer::aimed::rehearsed_at_aim;
 use crate::deflection_compensation::answer::auto::settled;
 use crate::deflection_compensation::answer::driven::Again;
 use crate::deflection_compensation::answer::output::{AddedSupport, OneMoreRest};
@@ -67,9 +67,10 @@ fn estimate(job: &Job, monitor: &dyn Monitor) -> Result<Option<Estimate>, Failur
     let judged = || -> Result<Option<Estimate>, Failure> {
         let (job, _) = settled(job, monitor)?;
         let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
-        let (driven, _) = cuts_at_aim(&job, &Grid::of(&job), &acting, &mut |_, _, _| (), &Again(monitor))?;
-        let Some(rehearsal) = &driven.rehearsal else { return Ok(None) };
-        Judged::of(job.asked(), rehearsal, monitor)?.map(|judged| judged.least_found(0.0)).transpose()
+        let Some(rehearsal) = rehearsed_at_aim(&job, &Grid::of(&job), &acting, &Again(monitor))? else {
+            return Ok(None);
+        };
+        Judged::of(job.asked(), &rehearsal, monitor)?.map(|judged| judged.least_found(0.0)).transpose()
     };
     match judged() {
         Err(Failure::OutOfModel(_)) => Ok(None),
