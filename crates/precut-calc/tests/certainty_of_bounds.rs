@@ -89,7 +89,7 @@ fn the_best_aim_is_that_of_the_worst_case() {
     // Advised where nothing is aimed at, and so when it is done.
     let plain = of_shaft(&both, &tolerance, "nominal");
     let advised = plain["conformance"]["advice"].as_array().unwrap();
-    assert!(advised.iter().all(|one| one["kind"] == "shift_aim"), "{advised:?}");
+    assert!(advised.iter().all(|one| one["action"]["kind"] == "shift_aim"), "{advised:?}");
     let joint = &answer["conformance"]["joint"];
     let told = number(&advised[0], "/joint_probability");
     assert!(

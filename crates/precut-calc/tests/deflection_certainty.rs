@@ -271,7 +271,7 @@ fn an_aim_that_is_advised_is_as_good_as_told() {
     let job = uncertain_job(&tolerance);
     let answer = solved(&job);
     let advice = answer["conformance"]["advice"].as_array().unwrap();
-    let aim = advice.iter().find(|one| one["kind"] == "shift_aim").unwrap();
+    let aim = advice.iter().find(|one| one["action"]["kind"] == "shift_aim").unwrap();
     let mut aimed = job.clone();
     aimed["aim"] = json!({ "kind": "most_probable" });
     let then = solved(&aimed);
@@ -296,8 +296,8 @@ fn a_first_part_that_is_measured_as_advised_helps_as_told() {
     let job = uncertain_job(&json!({ "diameter_um": upper - lower }));
     let answer = solved(&job);
     let advice = answer["conformance"]["advice"].as_array().unwrap();
-    let first = advice.iter().find(|one| one["kind"] == "measure_first_part").unwrap();
-    let of = |name: &str| number(first, &format!("/{name}"));
+    let first = advice.iter().find(|one| one["action"]["kind"] == "measure_first_part").unwrap();
+    let of = |name: &str| number(&first["action"], &format!("/{name}"));
     let (z, commands) = commands(&answer);
     let station = z.iter().position(|z| (z - of("z_mm")).abs() < 1e-6).unwrap_or_else(|| {
         // Between two stations of the answer the nearer one.
@@ -314,7 +314,7 @@ fn a_first_part_that_is_measured_as_advised_helps_as_told() {
             is_good(&cut(&job, &z, &shifted, truth), lower, upper)
         })
         .count() as f64;
-    let (share, told) = (good / count as f64, of("joint_probability"));
+    let (share, told) = (good / count as f64, number(first, "/joint_probability"));
     eprintln!("measured: told {told}, {share} of {count}; before {}", answer["conformance"]["joint"]);
     assert!((share - told).abs() < 3.0 * (told * (1.0 - told) / count as f64).sqrt() + 0.015, "{share} {told}");
 }

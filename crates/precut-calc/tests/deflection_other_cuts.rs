@@ -12,14 +12,15 @@ fn advice(answer: &Value) -> Vec<Value> {
 fn done(job: &Value, advised: &Value) -> Option<Value> {
     let mut job = job.clone();
     let add = |job: &mut Value, support: Value| job["supports"].as_array_mut().unwrap().push(support);
-    let (z_mm, compliance) = (&advised["z_mm"], &advised["compliance_um_per_n"]);
-    match advised["kind"].as_str().unwrap() {
+    let action = &advised["action"];
+    let (z_mm, compliance) = (&action["z_mm"], &action["compliance_um_per_n"]);
+    match action["kind"].as_str().unwrap() {
         "lower_feed" => match job.get_mut("passes").and_then(|passes| passes.as_array_mut()?.last_mut()) {
-            Some(pass) => pass["feed_mm_per_rev"] = advised["feed_mm_per_rev"].clone(),
-            None => job["cut"]["feed_mm_per_rev"] = advised["feed_mm_per_rev"].clone(),
+            Some(pass) => pass["feed_mm_per_rev"] = action["feed_mm_per_rev"].clone(),
+            None => job["cut"]["feed_mm_per_rev"] = action["feed_mm_per_rev"].clone(),
         },
         "shallower_last_pass" => {
-            let before = json!({ "diameter_mm": advised["diameter_mm"], "compensated": true });
+            let before = json!({ "diameter_mm": action["diameter_mm"], "compensated": true });
             match job.get_mut("passes").and_then(Value::as_array_mut) {
                 Some(passes) => passes.insert(passes.len() - 1, before),
                 None => job["passes"] = json!([before, { "diameter_mm": 40.0, "compensated": true }]),
@@ -43,10 +44,10 @@ fn tried(job: &Value) -> Vec<String> {
         let Some(done) = done(job, &advised) else { continue };
         let then = solved(&done);
         let (told, found) = (number(&advised, "/joint_probability"), number(&then, "/conformance/joint/probability"));
-        eprintln!("{}: {now:.4} before, {told:.4} told, {found:.4} found", advised["kind"]);
+        eprintln!("{}: {now:.4} before, {told:.4} told, {found:.4} found", advised["action"]["kind"]);
         // The same points, the same model: what is told is what is then answered.
         assert!((told - found).abs() < 1e-9 && found > now, "{advised}: {found}, before {now}");
-        kinds.push(advised["kind"].as_str().unwrap().to_owned());
+        kinds.push(advised["action"]["kind"].as_str().unwrap().to_owned());
     }
     kinds
 }
@@ -72,4 +73,32 @@ fn nothing_is_advised_where_the_probability_suffices() {
     let mut sure = uncertain_job(&json!({ "diameter_um": 24.0 }));
     sure["uncertainty"]["wanted_probability"] = json!(0.01);
     assert!(advice(&solved(&sure)).iter().all(|advised| done(&sure, advised).is_none()));
+}
+
+/// What a job cannot ask for is not advised: a feed below the least one, a pass more than it may have.
+#[test]
+fn no_other_cut_is_advised_that_a_job_cannot_have() {
+    let kinds = |job: &Value| -> Vec<Value> {
+        advice(&solved(job)).iter().map(|advised| advised["action"]["kind"].clone()).collect()
+    };
+    let has = |job: &Value, kind: &str| kinds(job).contains(&json!(kind));
+    let mut job = uncertain_job(&json!({ "diameter_um": 24.0 }));
+    // All but the last take next to nothing.
+    let passes = |count: u32| -> Value {
+        let step = |left: u32| 40.9 + 0.002 * f64::from(left);
+        let before = (1..count).rev().map(step);
+        before.chain([40.0]).map(|diameter_mm| json!({ "diameter_mm": diameter_mm, "compensated": true })).collect()
+    };
+    job["uncertainty"]["wanted_probability"] = json!(0.999_999);
+    job["passes"] = passes(19);
+    assert!(has(&job, "shallower_last_pass"));
+    job["passes"] = passes(20);
+    assert!(!has(&job, "shallower_last_pass"));
+    job.as_object_mut().unwrap().remove("passes");
+    for (feed, is_advised) in [(1.5e-4_f64, true), (1.4e-4, false)] {
+        job["cut"]["feed_mm_per_rev"] = json!(feed);
+        // A material of which so thin a chip asks for the same force.
+        job["force"]["passive"]["coefficient"] = json!(1500.0 * (0.2 / feed).powf(0.6));
+        assert_eq!(has(&job, "lower_feed"), is_advised, "{feed}");
+    }
 }

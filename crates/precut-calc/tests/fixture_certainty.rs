@@ -99,6 +99,15 @@ fn a_force_alone_has_a_closed_form() {
     let job = with(&job, "/limits", json!({ "depth_max_mm": 12.0 }));
     let got = outcome(&job);
     let limit = got.chatter_depth_mm.unwrap();
+    // What the job states in percent, as a material by name brings it, is the same.
+    let mut in_percent = job.clone();
+    in_percent["uncertainty"].as_object_mut().unwrap().remove("quantities");
+    in_percent["uncertainty"]["force_percent"] = json!(100.0 * scatter);
+    assert_eq!(outcome(&in_percent).conformance, got.conformance);
+    // A quantity of that name takes its place.
+    let mut both = job.clone();
+    both["uncertainty"]["force_percent"] = json!(3.0);
+    assert_eq!(outcome(&both).conformance, got.conformance);
     let score = (limit / number(&job, "/cut/depth_mm")).ln() / scatter;
     let exact = 0.5 * (1.0 + erf(score / std::f64::consts::SQRT_2));
     let (probability, _) = told(&got, "stable");

@@ -55,6 +55,9 @@ fn a_force_alone_has_a_closed_form() {
             &json!({ "cut": { "depth_mm": limit * f64::exp(-scatter * score) }, "analyses": ["certainty"] }),
         );
         let found = conformance(&job);
+        // What the job states in percent, as a material by name brings it, is the same.
+        let in_percent = json!({ "uncertainty": { "quantities": null, "force_percent": 100.0 * scatter } });
+        assert_eq!(conformance(&merged(job.clone(), &in_percent)), found);
         // The place along the line is found to 1e-4 of a standard deviation, the multiplier to that of a map.
         assert!((found.joint.probability - below(score)).abs() < 5e-4, "{score}: {:?}", found.joint);
         assert!((found.contributions[0].share_of_variance.unwrap() - 1.0).abs() < 1e-9);

@@ -257,21 +257,28 @@ impl Contribution {
     }
 }
 
+/// Something that would raise the probability.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Improvement {
+    /// What to do.
+    pub action: ImprovingAction,
+    /// Probability that a part is good then; of a measured first part that a later one is, on average over the readings.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub joint_probability: f64,
+    /// By how much that is more.
+    #[schema(extensions(("x-unit" = json!("1"))))]
+    pub gain: f64,
+}
+
 /// Something to do.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Improvement {
+pub enum ImprovingAction {
     /// Command all diameters larger by so much: `aim` does it.
     ShiftAim {
         /// By how much.
         #[schema(extensions(("x-unit" = json!("um"))))]
         shift_um: f64,
-        /// Probability that a part is good then.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
     /// Measure the diameter of the first part at one place, and shift the command by what the model makes of it.
     MeasureFirstPart {
@@ -290,36 +297,18 @@ pub enum Improvement {
         /// Further shift for every micrometre that the reading is larger.
         #[schema(extensions(("x-unit" = json!("1"))))]
         shift_um_per_um: f64,
-        /// Probability that a later part is good then, on average over the readings.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
     /// Take the last pass with a smaller feed.
     LowerFeed {
         /// Feed of the last pass.
         #[schema(extensions(("x-unit" = json!("mm/rev"))))]
         feed_mm_per_rev: f64,
-        /// Probability that a part is good then.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
     /// Leave less for the last pass: a compensated pass before it turns down to this diameter.
     ShallowerLastPass {
         /// Diameter that the pass before the last turns down to.
         #[schema(extensions(("x-unit" = json!("mm"))))]
         diameter_mm: f64,
-        /// Probability that a part is good then.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
     /// Hold the part by one more steady rest.
     AddSteadyRest {
@@ -329,12 +318,6 @@ pub enum Improvement {
         /// How compliant it is taken to be.
         #[schema(extensions(("x-unit" = json!("um/N"))))]
         compliance_um_per_n: f64,
-        /// Probability that a part is good then.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
     /// Hold the free end by a centre.
     AddCentre {
@@ -344,26 +327,20 @@ pub enum Improvement {
         /// How compliant it is taken to be.
         #[schema(extensions(("x-unit" = json!("um/N"))))]
         compliance_um_per_n: f64,
-        /// Probability that a part is good then.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        joint_probability: f64,
-        /// By how much that is more.
-        #[schema(extensions(("x-unit" = json!("1"))))]
-        gain: f64,
     },
 }
 
 impl Improvement {
-    /// By how much it raises the probability.
-    pub fn gain(&self) -> f64 {
-        match *self {
-            Self::ShiftAim { gain, .. }
-            | Self::MeasureFirstPart { gain, .. }
-            | Self::LowerFeed { gain, .. }
-            | Self::ShallowerLastPass { gain, .. }
-            | Self::AddSteadyRest { gain, .. }
-            | Self::AddCentre { gain, .. } => gain,
-        }
+    /// Of a probability to another one; `None` where it gains no more than both errors.
+    pub(crate) fn of(action: ImprovingAction, now: Estimate, then: Estimate) -> Option<Self> {
+        let gain = then.probability - now.probability;
+        let told = Self { action, joint_probability: bounded(then.probability), gain };
+        (gain > now.error + then.error).then_some(told)
+    }
+
+    /// The largest gain first.
+    pub(crate) fn sort(all: &mut [Self]) {
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     }
 }
 
@@ -371,7 +348,7 @@ impl Conformance {
     /// With more that would raise the probability.
     pub(crate) fn advise(&mut self, more: Vec<Improvement>) {
         self.advice.extend(more);
-        self.advice.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+        Improvement::sort(&mut self.advice);
     }
 }
 

@@ -24,13 +24,21 @@ pub(crate) trait Block {
     /// Whether what is usual is uncertain, too.
     fn has_usual(&self) -> bool;
 
+    /// Standard uncertainty in percent that it states of a quantity, in place of what is usual.
+    fn percent(&self, _quantity: Self::Of) -> Option<f64> {
+        None
+    }
+
     /// A quantity as the job states it, else as is usual; `None` of one that is known.
     fn uncertain(&self, quantity: Self::Of, level: Level, usual: Option<Distribution>) -> Option<Uncertain<Self::Of>> {
         let own = self.stated().into_iter().find(|(stated, _)| *stated == quantity);
-        let (distribution, source) = match (own, usual) {
-            (Some((_, own)), _) => (own.clone(), Source::Stated),
-            (None, Some(usual)) if self.has_usual() => (usual, Source::Default),
-            (None, _) => return None,
+        let (distribution, source) = match (own, usual, self.percent(quantity)) {
+            (Some((_, own)), _, _) => (own.clone(), Source::Stated),
+            (None, Some(_), Some(percent)) => {
+                (Distribution::Lognormal { log_standard_deviation: percent / 100.0 }, Source::Stated)
+            }
+            (None, Some(usual), None) if self.has_usual() => (usual, Source::Default),
+            (None, _, _) => return None,
         };
         distribution.is_wide().then_some(Uncertain { quantity, distribution, level, source })
     }
@@ -69,6 +77,7 @@ macro_rules! uncertainty_block {
     (
         $(#[$about:meta])*
         $block:ident {
+            $(force_percent: $percent:ty, of $force:ident;)?
             quantities: $one:ident of $quantity:ident ($($quantities:tt)*), such as $example:tt;
             correlations: $pair:ident ($pairs:tt), such as $examples:tt;
             $(effects: $open:ty;)?
@@ -83,6 +92,13 @@ macro_rules! uncertainty_block {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $block {
+            $(
+                /// Of the cutting force, the standard deviation of its logarithm, in place of the usual 10 %; a material by name brings
+                /// its own.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                #[schema(minimum = 0.0, maximum = 100.0, example = 15.0, extensions(("x-unit" = json!("percent")), ("x-symbol" = json!("u_F"))))]
+                pub force_percent: $percent,
+            )?
             /// What is uncertain, in place of what is usual or beside it.
             #[serde(default, skip_serializing_if = "Vec::is_empty")]
             #[schema($($quantities)*)]
@@ -122,6 +138,7 @@ macro_rules! uncertainty_block {
             fn default() -> Self {
                 use crate::certainty::block::{nineteen_of_twenty, one, yes};
                 Self {
+                    $(force_percent: <$percent>::default(),)?
                     quantities: Vec::new(),
                     correlations: Vec::new(),
                     $(effects: <$open>::new(),)?
@@ -147,6 +164,12 @@ macro_rules! uncertainty_block {
             fn has_usual(&self) -> bool {
                 self.defaults
             }
+
+            $(
+                fn percent(&self, quantity: $quantity) -> Option<f64> {
+                    self.force_percent.filter(|_| quantity == $quantity::$force)
+                }
+            )?
         }
 
         /// How a quantity is distributed.

@@ -21,8 +21,8 @@ mod scores;
 mod surface;
 
 pub use answer::{
-    Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, IntervalSearch, JointlyKept, LimitKept,
-    SeveralParts,
+    Acceptance, Conformance, ConformanceMethod, Contribution, Improvement, ImprovingAction, IntervalSearch,
+    JointlyKept, LimitKept, SeveralParts,
 };
 pub(crate) use answer::{improbable, probably, with_largest, with_most};
 pub use block::ProbabilityCheck;

@@ -77,7 +77,7 @@ impl Calculator for DeflectionCompensation {
     const META: Meta = Meta {
         id: "deflection-compensation",
         kind: CalculatorKind::Calculator,
-        version: 12,
+        version: 13,
         title: "Deflection compensation",
         question: "Where must the tool go so that the slender shaft comes out straight?",
         summary: "A slender shaft bends away from the tool, so less is cut than commanded. From shaft, supports, \

@@ -2,7 +2,7 @@
 
 use crate::calculator::Failure;
 use crate::certainty::lines::{Estimate, Sketch};
-use crate::certainty::{Improvement, bounded};
+use crate::certainty::{Improvement, ImprovingAction};
 
 use super::judged::{ABOVE, BELOW, By, JOINT, Judged, MOST_LINES, SETS};
 use super::limits::Aim;
@@ -88,11 +88,7 @@ impl Judged<'_> {
         let (Some(least_um), Some(_)) = (self.asked.open_aim_um, self.limits.middle_um()) else { return Ok(None) };
         let best_um = self.aim_um(&Aim::MostProbable {})?;
         let then = self.least_found(best_um)?;
-        let gain = then.probability - now.probability;
-        Ok((gain > now.error + then.error && (best_um - shift_um).abs() > least_um).then(|| Improvement::ShiftAim {
-            shift_um: best_um,
-            joint_probability: bounded(then.probability),
-            gain,
-        }))
+        Ok(Improvement::of(ImprovingAction::ShiftAim { shift_um: best_um }, now, then)
+            .filter(|_| (best_um - shift_um).abs() > least_um))
     }
 }

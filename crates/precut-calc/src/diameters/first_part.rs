@@ -2,7 +2,7 @@
 
 use crate::calculator::Failure;
 use crate::certainty::lines::{Estimate, Margins};
-use crate::certainty::{Improvement, Level, bounded};
+use crate::certainty::{Improvement, ImprovingAction, Level};
 
 use super::judged::{ABOVE, By, JOINT, Judged, LIMITS, MOST_LINES};
 
@@ -80,16 +80,13 @@ impl Judged<'_> {
         let question = self.question(&axis, MOST_LINES[2]);
         let by = |by: By| move |scores: &[f64]| later(by, scores);
         let then = self.really(&question, &mut by(By::Model), &mut by(By::Surface))?.of[JOINT];
-        let gain = then.probability - now.probability;
-        let error = now.error + then.error;
-        Ok((gain > error).then(|| Improvement::MeasureFirstPart {
+        let action = ImprovingAction::MeasureFirstPart {
             z_mm: self.parts.places().z_mm[station],
             gauge_um: gauge,
             expected_um: errors_um[station],
             shift_as_expected_um: as_expected - shift_um,
             shift_um_per_um: slope,
-            joint_probability: bounded(then.probability),
-            gain,
-        }))
+        };
+        Ok(Improvement::of(action, now, then))
     }
 }

@@ -354,7 +354,7 @@ impl<'a> Judged<'a> {
         let mut advice: Vec<Improvement> = Vec::new();
         advice.extend(self.shifted(shift_um, joint)?);
         advice.extend(self.first_part(shift_um, joint)?);
-        advice.sort_by(|a, b| b.gain().total_cmp(&a.gain()));
+        Improvement::sort(&mut advice);
         let slopes = &self.slopes.of_um[self.slopes.deciding];
         let variance: f64 = slopes.iter().map(|s| s * s).sum();
         let is_independent = self.uncertainties.is_independent();

@@ -1,7 +1,7 @@
 //! What is said of the probability that diameters keep their limits.
 
 use crate::calculator::{Finding, Message};
-use crate::certainty::{Conformance, Improvement, improbable, with_largest, with_most};
+use crate::certainty::{Conformance, ImprovingAction, improbable, with_largest, with_most};
 
 use super::{Asked, acceptance};
 
@@ -22,41 +22,34 @@ pub(crate) fn said(conformance: &Conformance) -> Vec<Message> {
         .with("met", if joint.met { "yes" } else { "no" })
         .with("common_percent", 100.0 * conformance.setup.share_common_to_all);
     let first = with_largest(with_most(first, joint), &conformance.contributions);
-    let advised = conformance.advice.iter().map(|advice| match *advice {
-        Improvement::ShiftAim { shift_um, joint_probability, .. } => {
-            Message::new("aim_tells").with("shift_um", shift_um).with("percent", 100.0 * joint_probability)
-        }
-        Improvement::MeasureFirstPart {
-            z_mm,
-            expected_um,
-            shift_as_expected_um,
-            shift_um_per_um,
-            joint_probability,
-            ..
-        } => Message::new("first_part_tells")
-            .with("z_mm", z_mm)
-            .with("expected_um", expected_um)
-            .with("shift_um", shift_as_expected_um)
-            .with("shift_um_per_um", shift_um_per_um)
-            .with("percent", 100.0 * joint_probability),
-        Improvement::LowerFeed { feed_mm_per_rev, joint_probability, .. } => Message::new("lower_feed_tells")
-            .with("feed_mm_per_rev", feed_mm_per_rev)
-            .with("percent", 100.0 * joint_probability),
-        Improvement::ShallowerLastPass { diameter_mm, joint_probability, .. } => {
-            Message::new("shallower_last_pass_tells")
-                .with("diameter_mm", diameter_mm)
-                .with("percent", 100.0 * joint_probability)
-        }
-        Improvement::AddSteadyRest { z_mm, compliance_um_per_n, joint_probability, .. } => {
-            Message::new("steady_rest_tells")
+    let advised = conformance.advice.iter().map(|advice| {
+        let told = match advice.action {
+            ImprovingAction::ShiftAim { shift_um } => Message::new("aim_tells").with("shift_um", shift_um),
+            ImprovingAction::MeasureFirstPart {
+                z_mm,
+                expected_um,
+                shift_as_expected_um,
+                shift_um_per_um,
+                gauge_um: _,
+            } => Message::new("first_part_tells")
                 .with("z_mm", z_mm)
-                .with("compliance_um_per_n", compliance_um_per_n)
-                .with("percent", 100.0 * joint_probability)
-        }
-        Improvement::AddCentre { z_mm, compliance_um_per_n, joint_probability, .. } => Message::new("centre_tells")
-            .with("z_mm", z_mm)
-            .with("compliance_um_per_n", compliance_um_per_n)
-            .with("percent", 100.0 * joint_probability),
+                .with("expected_um", expected_um)
+                .with("shift_um", shift_as_expected_um)
+                .with("shift_um_per_um", shift_um_per_um),
+            ImprovingAction::LowerFeed { feed_mm_per_rev } => {
+                Message::new("lower_feed_tells").with("feed_mm_per_rev", feed_mm_per_rev)
+            }
+            ImprovingAction::ShallowerLastPass { diameter_mm } => {
+                Message::new("shallower_last_pass_tells").with("diameter_mm", diameter_mm)
+            }
+            ImprovingAction::AddSteadyRest { z_mm, compliance_um_per_n } => {
+                Message::new("steady_rest_tells").with("z_mm", z_mm).with("compliance_um_per_n", compliance_um_per_n)
+            }
+            ImprovingAction::AddCentre { z_mm, compliance_um_per_n } => {
+                Message::new("centre_tells").with("z_mm", z_mm).with("compliance_um_per_n", compliance_um_per_n)
+            }
+        };
+        told.with("percent", 100.0 * advice.joint_probability)
     });
     let accepted = conformance.acceptance.as_ref().map(acceptance::said);
     std::iter::once(first).chain(advised).chain(accepted).collect()

@@ -69,7 +69,7 @@ impl Calculator for FeedSchedule {
     const META: Meta = Meta {
         id: "feed-schedule",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Feed schedule",
         question: "Which feed and speed in which zone: fastest within tolerance, roughness, tool life and power?",
         summary: "From a shaft in its supports, models of force, tool life and surface, and limits: feed and speed of \

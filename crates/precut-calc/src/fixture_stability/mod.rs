@@ -70,7 +70,7 @@ impl Calculator for FixtureStability {
     const META: Meta = Meta {
         id: "fixture-stability",
         kind: CalculatorKind::Calculator,
-        version: 15,
+        version: 16,
         title: "Fixture stability",
         question: "How deep can this face mill cut in this vise before chatter or a joint opens, and how hard must one clamp?",
         summary: "A face mill shakes the workpiece in its vise: teeth enter and leave, each cuts what earlier ones left, \

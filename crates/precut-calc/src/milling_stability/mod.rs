@@ -53,7 +53,7 @@ impl Calculator for MillingStability {
     const META: Meta = Meta {
         id: "milling-stability",
         kind: CalculatorKind::Calculator,
-        version: 9,
+        version: 10,
         title: "Milling in three directions",
         question: "How deep may this cutter go at this speed before it chatters, and is it the tool or the workpiece that limits?",
         summary: "Tool and workpiece yield by modes in any direction, stated or made of measured frequency responses; edges may be helical, pitches, helices and run-out \

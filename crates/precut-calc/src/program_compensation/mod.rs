@@ -52,7 +52,7 @@ impl Calculator for ProgramCompensation {
     const META: Meta = Meta {
         id: "program-compensation",
         kind: CalculatorKind::Calculator,
-        version: 13,
+        version: 14,
         title: "The program that is there",
         question: "What does this turning program make the machine do, word by word, and what in it is not understood?",
         summary: "A turning program as it is, for Fanuc (G-code systems A, B and C), Siemens or LinuxCNC, is read as its \

@@ -239,6 +239,9 @@ fn normal(material: &View<'_>, row: &Row<'_>, word: Option<&Value>, writer: &mut
     true
 }
 
+/// Where a job says how well its cutting force is known.
+pub(super) const FORCE_PERCENT: &str = "/uncertainty/force_percent";
+
 /// How well the force is known.
 fn uncertainty(sources: &Sources<'_>, judged: bool, writer: &mut Writer<'_>) {
     let mut percent = sources.force_percent;
@@ -247,7 +250,7 @@ fn uncertainty(sources: &Sources<'_>, judged: bool, writer: &mut Writer<'_>) {
         percent = JUDGED_FORCE_PERCENT;
         part = Part::sourced(From::Material, "judgement", "judgement").by("library/6");
     }
-    writer.offer("/uncertainty/force_percent", percent, vec![part.worth(percent)]);
+    writer.offer(FORCE_PERCENT, percent, vec![part.worth(percent)]);
 }
 
 /// What the other sources say, where they differ.

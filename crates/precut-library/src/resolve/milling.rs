@@ -3,6 +3,7 @@
 use precut_calc::calculator::Finding;
 use serde_json::{Value, json};
 
+use super::force::FORCE_PERCENT;
 use super::kinds::Room;
 use super::origin::{From, Part};
 use super::view::{View, Views};
@@ -89,11 +90,15 @@ fn force(material: &View<'_>, writer: &mut Writer<'_>) {
     let part = |value: f64| {
         Part::sourced(From::Material, row.source, row.certainty).at(format!("/kienzle/{}", row.index)).worth(value)
     };
-    for (field, value) in [
-        ("coefficient", row.specific_cutting_force_n_per_mm2),
-        ("chip_thickness_exponent", row.cutting_exponent),
-        ("depth_exponent", 0.0),
-    ] {
+    let is_of_row = writer.offer(
+        "/force/coefficient",
+        row.specific_cutting_force_n_per_mm2,
+        vec![part(row.specific_cutting_force_n_per_mm2)],
+    );
+    for (field, value) in [("chip_thickness_exponent", row.cutting_exponent), ("depth_exponent", 0.0)] {
         writer.offer(&format!("/force/{field}"), value, vec![part(value)]);
+    }
+    if is_of_row {
+        writer.offer(FORCE_PERCENT, sources.force_percent, vec![part(sources.force_percent).by("library/3")]);
     }
 }

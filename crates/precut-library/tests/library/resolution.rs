@@ -331,7 +331,14 @@ fn milling_gets_cutter_spindle_and_force() {
     assert_eq!(job["cutter"], json!({"diameter_mm": 100.0, "teeth": 7}));
     assert_eq!(job["force"], json!({"coefficient": 2526.0, "chip_thickness_exponent": 0.25, "depth_exponent": 0.0}));
     assert_eq!(job["spindle"]["characteristic"][1]["power_kw"], json!(30.0));
+    // The force is as well known as the sources of the material agree on it.
+    let percent = job["uncertainty"]["force_percent"].as_f64().unwrap();
+    assert!(percent > 10.0, "{percent}");
+    assert_eq!(from_of(&resolution, "/uncertainty/force_percent"), "material");
     assert_origins(&job, &resolution);
+    let mut own = json!({"material": "42CrMo4", "cut": {}, "force": {"coefficient": 2000.0}});
+    faultless("fixture-stability", &mut own);
+    assert!(own.get("uncertainty").is_none(), "a coefficient of the job is no material's: {own}");
     for (part, ok) in [
         ("cutter", serde_json::from_value::<precut_calc::fixture_stability::FaceMill>(job["cutter"].clone()).is_ok()),
         ("spindle", serde_json::from_value::<precut_calc::fixture_stability::Spindle>(job["spindle"].clone()).is_ok()),
@@ -354,6 +361,7 @@ fn milling_in_three_directions_gets_a_law_and_the_fastest_speed() {
     assert_eq!(job["cutter"]["cutting_edge_angle_deg"], json!(45.0));
     assert_eq!(job["force"]["kind"], json!("power_law"));
     assert_eq!(job["force"]["coefficient"], json!(2526.0));
+    assert!(job["uncertainty"]["force_percent"].as_f64().is_some_and(|percent| percent > 10.0));
     assert!(job["spindle"]["speed_max_rpm"].as_f64().is_some_and(|speed| speed > 1000.0));
     for (part, ok) in [
         ("cutter", serde_json::from_value::<precut_calc::milling_stability::Cutter>(job["cutter"].clone()).is_ok()),

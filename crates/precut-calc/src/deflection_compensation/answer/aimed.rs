@@ -4,11 +4,12 @@ use crate::calculator::{Failure, Monitor};
 use crate::certainty::Conformance;
 use crate::diameters::{Aim, Judged};
 
-use crate::deflection_compensation::answer::driven::{Driven, drive};
+use crate::deflection_compensation::answer::driven::{Driven, drive, rehearsed};
 use crate::deflection_compensation::answer::output::ErrorFan;
 use crate::deflection_compensation::job::acting::Acting;
 use crate::deflection_compensation::job::grid::Grid;
 use crate::deflection_compensation::job::input::Job;
+use crate::deflection_compensation::model::rehearsal::Rehearsal;
 use crate::deflection_compensation::model::stage::Stage;
 
 /// Where the last cut is aimed at, and how sure it is to come out well.
@@ -27,7 +28,8 @@ pub(in crate::deflection_compensation) fn aimed<'a>(
     look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
 ) -> Result<(Driven<'a>, Sure), Failure> {
-    let (driven, aim_um) = cuts_at_aim(job, grid, acting, look, monitor)?;
+    let aim_um = aim_um(job, grid, acting, monitor)?;
+    let driven = drive(job, grid, acting, aim_um, look, monitor)?;
     let mut sure = Sure { aim_um, ..Sure::default() };
     if let Some(rehearsal) = &driven.rehearsal {
         // The path of the rehearsal is aimed already.
@@ -39,25 +41,28 @@ pub(in crate::deflection_compensation) fn aimed<'a>(
     Ok((driven, sure))
 }
 
-/// The cuts of a job, the last one aimed as the job says, and by how much that shifts its command, um.
-pub(in crate::deflection_compensation) fn cuts_at_aim<'a>(
+/// The last cut of a job, aimed as that says, as it may come out; no program is made of it.
+pub(in crate::deflection_compensation) fn rehearsed_at_aim<'a>(
     job: &'a Job,
     grid: &Grid,
     acting: &'a Acting,
-    look: &mut dyn FnMut(&Grid, &Stage, usize),
     monitor: &dyn Monitor,
-) -> Result<(Driven<'a>, f64), Failure> {
-    let driven = drive(job, grid, acting, 0.0, look, monitor)?;
+) -> Result<Option<Rehearsal<'a>>, Failure> {
+    rehearsed(job, grid, acting, aim_um(job, grid, acting, monitor)?, monitor)
+}
+
+/// By how much the aim of a job shifts the command of its last cut, um.
+fn aim_um(job: &Job, grid: &Grid, acting: &Acting, monitor: &dyn Monitor) -> Result<f64, Failure> {
     if job.aim == (Aim::Nominal {}) {
-        return Ok((driven, 0.0));
+        return Ok(0.0);
     }
-    let judged = match &driven.rehearsal {
+    let rehearsal = rehearsed(job, grid, acting, 0.0, monitor)?;
+    let judged = match &rehearsal {
         Some(rehearsal) => Judged::of(job.asked(), rehearsal, monitor)?,
         None => None,
     };
-    let aim_um = match judged {
-        Some(judged) => judged.aim_um(&job.aim)?,
-        None => job.tolerance.size().middle_um().unwrap_or(0.0),
-    };
-    Ok((drive(job, grid, acting, aim_um, &mut |_, _, _| (), monitor)?, aim_um))
+    match judged {
+        Some(judged) => judged.aim_um(&job.aim),
+        None => Ok(job.tolerance.size().middle_um().unwrap_or(0.0)),
+    }
 }

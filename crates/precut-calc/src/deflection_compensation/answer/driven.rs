@@ -63,12 +63,12 @@ pub(in crate::deflection_compensation) fn drive<'a>(
 ) -> Result<Driven<'a>, Failure> {
     let Refined { grid: fine, own } = grid.refined(job);
     let aim_mm = 0.5 * aim_um / UM_PER_MM;
-    let Cuts { stages, passes, paths, commands, produced_mm } =
-        Cuts::of(job, &fine, acting, Along::Moves { aim_mm }, look, monitor)?;
+    let cuts = along_moves(job, &fine, acting, aim_mm, look, monitor)?;
+    let rehearsal = rehearsal(job, acting, &fine, &cuts)?;
+    let Cuts { stages, passes, paths, produced_mm, .. } = cuts;
     let (Some(last), Some(path)) = (stages.last(), paths.last()) else {
         return Err(Failure::Internal("no cut was computed".to_owned()));
     };
-    in_reach(last)?;
     let at = |values: &[f64]| own.iter().map(|&i| values[i]).collect::<Vec<f64>>();
     let radii = Radii {
         target: at(&last.radii.target),
@@ -88,7 +88,6 @@ pub(in crate::deflection_compensation) fn drive<'a>(
     } else {
         (None, None)
     };
-    let rehearsal = if job.tolerance.is_none() { None } else { Rehearsal::of(job, acting, &fine, &stages, &commands)? };
     Ok(Driven {
         path: path.clone(),
         passes: passes.into_iter().map(|pass| at_stations(pass, &own)).collect(),
@@ -99,6 +98,39 @@ pub(in crate::deflection_compensation) fn drive<'a>(
         proof,
         rehearsal,
     })
+}
+
+/// The same cuts again with what is uncertain, without a program of them; see [`Driven::rehearsal`].
+pub(in crate::deflection_compensation) fn rehearsed<'a>(
+    job: &'a Job,
+    grid: &Grid,
+    acting: &'a Acting,
+    aim_um: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<Rehearsal<'a>>, Failure> {
+    let fine = grid.refined(job).grid;
+    let cuts = along_moves(job, &fine, acting, 0.5 * aim_um / UM_PER_MM, &mut |_, _, _| (), monitor)?;
+    rehearsal(job, acting, &fine, &cuts)
+}
+
+fn along_moves(
+    job: &Job,
+    fine: &Grid,
+    acting: &Acting,
+    aim_mm: f64,
+    look: &mut dyn FnMut(&Grid, &Stage, usize),
+    monitor: &dyn Monitor,
+) -> Result<Cuts, Failure> {
+    let cuts = Cuts::of(job, fine, acting, Along::Moves { aim_mm }, look, monitor)?;
+    cuts.stages.last().map_or(Ok(()), in_reach)?;
+    Ok(cuts)
+}
+
+fn rehearsal<'a>(job: &'a Job, acting: &'a Acting, fine: &Grid, cuts: &Cuts) -> Result<Option<Rehearsal<'a>>, Failure> {
+    if job.tolerance.is_none() {
+        return Ok(None);
+    }
+    Rehearsal::of(job, acting, fine, &cuts.stages, &cuts.commands)
 }
 
 /// A pass at some of its stations; its form error stays that of all.

@@ -1,12 +1,18 @@
 //! Other cuts that make a good part more probable (`certainty/4.4`). Each is planned and judged as a job of its own.
 
+use std::sync::LazyLock;
+
+use serde_json::Value;
+use utoipa::PartialSchema;
+use utoipa::openapi::{RefOr, Schema};
+
 use crate::calculator::{Failure, Monitor};
 use crate::certainty::lines::Estimate;
-use crate::certainty::{Improvement, JointlyKept};
+use crate::certainty::{Improvement, ImprovingAction, JointlyKept};
 use crate::diameters::Judged;
 
 use crate::deflection_compensation::answer::advice::held_more;
-use crate::deflection_compensation::answer::aimed::cuts_at_aim;
+use crate::deflection_compensation::answer::aimed::rehearsed_at_aim;
 use crate::deflection_compensation::answer::auto::settled;
 use crate::deflection_compensation::answer::driven::Again;
 use crate::deflection_compensation::answer::output::{AddedSupport, OneMoreRest};
@@ -16,18 +22,23 @@ use crate::deflection_compensation::job::input::{Job, Pass};
 
 /// Share of the feed that is tried.
 const SLOWER: f64 = 0.7;
-/// Least feed of a job, mm/rev.
-const LEAST_FEED: f64 = 1e-4;
 /// Share of its depth that a shallower last pass keeps.
 const SHALLOWER: f64 = 0.5;
-/// Most passes of a job.
-const MOST_PASSES: usize = 20;
+/// Least feed and most passes of a job: they stand in its schema.
+static LEAST_FEED_MM_PER_REV: LazyLock<f64> =
+    LazyLock::new(|| bound(Pass::schema(), "/properties/feed_mm_per_rev/minimum"));
+static MOST_PASSES: LazyLock<f64> = LazyLock::new(|| bound(Job::schema(), "/properties/passes/maxItems"));
 
-/// Another cut, and how it is told.
+/// A bound of a schema; not a number where there is none, which nothing keeps.
+fn bound(schema: RefOr<Schema>, at: &str) -> f64 {
+    let schema = serde_json::to_value(schema).unwrap_or_default();
+    schema.pointer(at).and_then(Value::as_f64).unwrap_or(f64::NAN)
+}
+
+/// Another cut, and what is done for it.
 struct OtherCut {
     job: Job,
-    /// Makes the advice from the probability of a good part and its gain.
-    told: Box<dyn FnOnce(f64, f64) -> Improvement>,
+    action: ImprovingAction,
 }
 
 /// The other cuts that raise the probability by more than both errors. None is tried where the job has the probability that it wants; one
@@ -43,12 +54,10 @@ pub(in crate::deflection_compensation) fn improvements(
         return Ok(found);
     }
     let others = [slower(job), shallower(job), rest.map(|rest| held(job, rest))];
-    for OtherCut { job, told } in others.into_iter().flatten() {
-        let Some(then) = estimate(&job, monitor)? else { continue };
-        let gain = then.probability - now.probability;
-        if gain > now.numerical_error + then.error {
-            found.push(told(crate::certainty::bounded(then.probability), gain));
-        }
+    let now = Estimate { probability: now.probability, error: now.numerical_error };
+    for OtherCut { job, action } in others.into_iter().flatten() {
+        let then = estimate(&job, monitor)?;
+        found.extend(then.and_then(|then| Improvement::of(action, now, then)));
     }
     Ok(found)
 }
@@ -58,9 +67,10 @@ fn estimate(job: &Job, monitor: &dyn Monitor) -> Result<Option<Estimate>, Failur
     let judged = || -> Result<Option<Estimate>, Failure> {
         let (job, _) = settled(job, monitor)?;
         let acting = Acting::of(&job.effects, &job.conditions, job.cut.feed_direction);
-        let (driven, _) = cuts_at_aim(&job, &Grid::of(&job), &acting, &mut |_, _, _| (), &Again(monitor))?;
-        let Some(rehearsal) = &driven.rehearsal else { return Ok(None) };
-        Judged::of(job.asked(), rehearsal, monitor)?.map(|judged| judged.least_found(0.0)).transpose()
+        let Some(rehearsal) = rehearsed_at_aim(&job, &Grid::of(&job), &acting, &Again(monitor))? else {
+            return Ok(None);
+        };
+        Judged::of(job.asked(), &rehearsal, monitor)?.map(|judged| judged.least_found(0.0)).transpose()
     };
     match judged() {
         Err(Failure::OutOfModel(_)) => Ok(None),
@@ -77,14 +87,8 @@ fn slower(job: &Job) -> Option<OtherCut> {
     };
     *feed *= SLOWER;
     let feed_mm_per_rev = *feed;
-    (feed_mm_per_rev >= LEAST_FEED).then(|| OtherCut {
-        job: slower,
-        told: Box::new(move |joint_probability, gain| Improvement::LowerFeed {
-            feed_mm_per_rev,
-            joint_probability,
-            gain,
-        }),
-    })
+    (feed_mm_per_rev >= *LEAST_FEED_MM_PER_REV)
+        .then(|| OtherCut { job: slower, action: ImprovingAction::LowerFeed { feed_mm_per_rev } })
 }
 
 /// A compensated pass before the last one that leaves half of its depth. Of a shaft that is turned to several diameters in one pass no one
@@ -109,14 +113,8 @@ fn shallower(job: &Job) -> Option<OtherCut> {
         }
         [_] => return None,
     };
-    (shallower.passes.len() <= MOST_PASSES).then(|| OtherCut {
-        job: shallower,
-        told: Box::new(move |joint_probability, gain| Improvement::ShallowerLastPass {
-            diameter_mm,
-            joint_probability,
-            gain,
-        }),
-    })
+    (shallower.passes.len() as f64 <= *MOST_PASSES)
+        .then(|| OtherCut { job: shallower, action: ImprovingAction::ShallowerLastPass { diameter_mm } })
 }
 
 fn pass(diameter_mm: f64) -> Pass {
@@ -128,11 +126,9 @@ fn held(job: &Job, rest: &OneMoreRest) -> OtherCut {
     let OneMoreRest { kind, z_mm, compliance_um_per_n, .. } = *rest;
     OtherCut {
         job: held_more(job, (kind, z_mm, compliance_um_per_n)),
-        told: Box::new(move |joint_probability, gain| match kind {
-            AddedSupport::SteadyRest => {
-                Improvement::AddSteadyRest { z_mm, compliance_um_per_n, joint_probability, gain }
-            }
-            AddedSupport::Centre => Improvement::AddCentre { z_mm, compliance_um_per_n, joint_probability, gain },
-        }),
+        action: match kind {
+            AddedSupport::SteadyRest => ImprovingAction::AddSteadyRest { z_mm, compliance_um_per_n },
+            AddedSupport::Centre => ImprovingAction::AddCentre { z_mm, compliance_um_per_n },
+        },
     }
 }

@@ -7,7 +7,7 @@ use crate::diameters::{self, Asked, Uncertainty};
 use crate::effects::DeflectionEffect;
 
 use crate::deflection_compensation::DeflectionCompensation;
-use crate::deflection_compensation::answer::aimed::cuts_at_aim;
+use crate::deflection_compensation::answer::aimed::rehearsed_at_aim;
 use crate::deflection_compensation::answer::output::Path;
 use crate::deflection_compensation::job::acting::Acting;
 use crate::deflection_compensation::job::grid::Grid;
@@ -80,19 +80,18 @@ pub(super) fn parts_kept(
     let planned = believing(job, &runs.first().cloned().unwrap_or_default(), believed);
     let grid = Grid::of(&planned);
     let of_path = Acting::of(&planned.effects, &planned.conditions, planned.cut.feed_direction);
-    let driven = match cuts_at_aim(&planned, &grid, &of_path, &mut |_, _, _| (), &Quiet(monitor)) {
-        Ok((driven, _)) => driven,
-        Err(Failure::OutOfModel(_)) => return Ok(None),
+    let rehearsal = match rehearsed_at_aim(&planned, &grid, &of_path, &Quiet(monitor)) {
+        Ok(Some(rehearsal)) => rehearsal,
+        Ok(None) | Err(Failure::OutOfModel(_)) => return Ok(None),
         Err(failure) => return Err(failure),
     };
-    let Some(rehearsal) = &driven.rehearsal else { return Ok(None) };
     // What is told comes first, as its uncertainty counts; of the others what scatters is asked for.
     let is_other = |effect: &&DeflectionEffect| told.effects.iter().all(|own| own.kind() != effect.kind());
     let others = acting.first().into_iter().flatten().filter(is_other);
     let effects: Vec<DeflectionEffect> = told.effects.iter().chain(others).cloned().collect();
     let uncertainty = Uncertainty { effects: told.open.to_vec(), ..job.uncertainty.clone() };
     let asked = Asked { uncertainty: &uncertainty, effects: &effects, ..planned.asked() };
-    diameters::kept(rehearsal, &asked, acting, monitor)
+    diameters::kept(&rehearsal, &asked, acting, monitor)
 }
 
 /// The job of one cut from the stock with these effects beside its own: it takes the switches as they stand, as the model that

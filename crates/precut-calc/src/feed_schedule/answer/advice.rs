@@ -10,6 +10,7 @@ use crate::feed_schedule::answer::toolpath::Made;
 use crate::feed_schedule::job::case::Case;
 use crate::feed_schedule::job::input::{FeedMode, Goal, Job, SpeedMode};
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::of_fit;
 use crate::feed_schedule::job::plan::Method;
 use crate::feed_schedule::job::scatter;
 use crate::feed_schedule::model::risk;
@@ -341,6 +342,10 @@ fn limits_kept(job: &Job, outcome: &Outcome) -> Option<Message> {
     }
     if job.uncertainty.is_open() {
         said = said.with("open", "yes");
+        let replaced: Vec<&str> = of_fit::replaced(job).into_iter().map(Output::name).collect();
+        if !replaced.is_empty() {
+            said = said.with("replaced", replaced);
+        }
     }
     if let Some(found) = conformance.risk_percent.filter(|found| !risk::is_at_an_end(*found)) {
         said = said.with("found_percent", found);

@@ -9,6 +9,7 @@ pub(super) mod effects;
 pub(super) mod formula;
 pub(super) mod input;
 pub(super) mod models;
+pub(super) mod of_fit;
 pub(super) mod open;
 pub(super) mod plan;
 pub(super) mod remainder;

@@ -131,9 +131,10 @@ pub(in crate::feed_schedule) struct MovedResults<'a> {
     open: &'a OpenModels,
     job: &'a Job,
     results: Vec<Given>,
-    /// The results as stated, and how far each moves with every score, where that is all there is to it.
+    /// The results as stated, how far each moves with every score to first order, and whether that is all there is to it.
     stated: Vec<f64>,
-    straight: Option<Vec<Vec<f64>>>,
+    by_score: Vec<Vec<f64>>,
+    is_straight: bool,
 }
 
 impl<'a> MovedResults<'a> {
@@ -142,34 +143,34 @@ impl<'a> MovedResults<'a> {
         job: &'a Job,
         results: Vec<Given>,
     ) -> Result<Self, Failure> {
-        let mut moved = Self { open, job, results, stated: Vec::new(), straight: None };
+        let mut moved = Self { open, job, results, stated: Vec::new(), by_score: Vec::new(), is_straight: true };
         moved.stated = moved.values(&job.effects);
         let by_score = |score: usize| -> Vec<f64> {
             let [up, down] = open.off[score].each_ref().map(|effects| moved.values(effects));
             up.iter().zip(down).map(|(up, down)| 0.5 * (up - down)).collect()
         };
-        let straight: Vec<Vec<f64>> = (0..open.count()).map(by_score).collect();
-        let mut is_straight = true;
+        moved.by_score = (0..open.count()).map(by_score).collect();
         for scores in points(TRIED, open.count(), 0) {
-            let really = moved.really(&scores)?;
-            is_straight &=
-                really.iter().enumerate().all(|(i, by)| (by - along(&straight, &scores, i)).abs() < STRAIGHT);
+            let (really, nearly) = (moved.really(&scores)?, moved.nearly(&scores));
+            moved.is_straight &= really.iter().zip(nearly).all(|(by, near)| (by - near).abs() < STRAIGHT);
         }
-        moved.straight = is_straight.then_some(straight);
         Ok(moved)
     }
 
     /// Whether results move straight with every score.
     pub(in crate::feed_schedule) fn are_straight(&self) -> bool {
-        self.straight.is_some()
+        self.is_straight
     }
 
     /// How far every result moves.
     pub(in crate::feed_schedule) fn at(&self, scores: &[f64]) -> Result<Vec<f64>, Failure> {
-        match &self.straight {
-            Some(straight) => Ok((0..self.results.len()).map(|result| along(straight, scores, result)).collect()),
-            None => self.really(scores),
-        }
+        if self.is_straight { Ok(self.nearly(scores)) } else { self.really(scores) }
+    }
+
+    /// How far every result moves to first order.
+    pub(in crate::feed_schedule) fn nearly(&self, scores: &[f64]) -> Vec<f64> {
+        let of = |result: usize| self.by_score.iter().zip(scores).map(|(by, score)| by[result] * score).sum();
+        (0..self.results.len()).map(of).collect()
     }
 
     fn really(&self, scores: &[f64]) -> Result<Vec<f64>, Failure> {
@@ -186,9 +187,4 @@ impl<'a> MovedResults<'a> {
         };
         self.results.iter().map(value).collect()
     }
-}
-
-/// How far a result moves with all scores.
-fn along(straight: &[Vec<f64>], scores: &[f64], result: usize) -> f64 {
-    straight.iter().zip(scores).map(|(by, score)| by[result] * score).sum()
 }

@@ -15,6 +15,7 @@ use crate::feed_schedule::answer::output::{Outcome, ScheduleConformance, Schedul
 use crate::feed_schedule::job::case::{Case, ZoneCase};
 use crate::feed_schedule::job::input::Job;
 use crate::feed_schedule::job::models::Output;
+use crate::feed_schedule::job::of_fit;
 use crate::feed_schedule::job::open::{Given, Move, MovedResults, OpenModels};
 
 /// A share below this is not told.
@@ -159,10 +160,9 @@ pub(in crate::feed_schedule) fn scatter(
     depth_mm: f64,
 ) -> Option<Scatter> {
     let model = job.models.get(output);
-    let of_fit = model.and_then(|model| model.coefficient_covariance.as_ref());
-    let mut coefficients = of_fit.and_then(|covariance| {
-        let matrix = covariance.as_matrix()?;
-        let factors = covariance.factors(depth_mm, job.cutting_edge_angle_deg);
+    let covariance = model.and_then(|model| model.coefficient_covariance.as_ref());
+    let mut coefficients = covariance.and_then(|covariance| {
+        let (matrix, factors) = (covariance.as_matrix()?, of_fit::factors(job, output, depth_mm)?);
         let mut form = [[0.0; 3]; 3];
         for (i, by) in factors.iter().enumerate() {
             for (j, with) in factors.iter().enumerate() {
@@ -179,7 +179,7 @@ pub(in crate::feed_schedule) fn scatter(
         }
     }
     let residual = model.and_then(|model| model.residual_scatter).unwrap_or(0.0);
-    let degrees = of_fit.and_then(|covariance| covariance.degrees_of_freedom);
+    let degrees = covariance.and_then(|covariance| covariance.degrees_of_freedom);
     let log_log = model.is_none_or(|model| model.form == ModelForm::LogLog);
     let scatter = Scatter { residual, coefficients, bent: bent.into(), degrees, log_log };
     (residual > 0.0 || scatter.bends()).then_some(scatter)
@@ -201,8 +201,9 @@ struct Kept {
     limit: f64,
     /// The probability that it is passed.
     passed: f64,
-    /// How far the limit lies beyond what is expected, in the scale of the model, and where.
+    /// How far the limit lies beyond what is expected, in the scale of the model, on which side (-1 of a least value), and where.
     beyond: f64,
+    side: f64,
     at: (f64, f64),
     depth_mm: f64,
 }
@@ -226,6 +227,7 @@ fn of_part(job: &Job, case: &Case, outcome: &Outcome) -> Vec<Kept> {
                 limit,
                 passed,
                 beyond,
+                side: 1.0,
                 at,
                 depth_mm: zone.depth_mm,
             })
@@ -246,7 +248,7 @@ fn of_edges(job: &Job, case: &Case, outcome: &Outcome) -> (Vec<Kept>, Vec<Kept>)
         let scatter = scatter(job, &case.open, Output::ToolLife, depth_mm)?;
         let passed = scatter.passed(beyond, at);
         let zone = zone.to_owned();
-        Some(Kept { output: Output::ToolLife, name, zone, value, limit, passed, beyond, at, depth_mm })
+        Some(Kept { output: Output::ToolLife, name, zone, value, limit, passed, beyond, side: -1.0, at, depth_mm })
     };
     let lives = outcome.zones.iter().filter_map(|zone| {
         let (life, least) = (zone.tool_life_min?, case.limits.tool_life_min_min?);
@@ -320,36 +322,37 @@ pub(in crate::feed_schedule) fn conformance(
     case: &Case,
     outcome: &Outcome,
 ) -> Result<Option<ScheduleConformance>, Failure> {
-    let part = of_part(job, case, outcome);
+    let mut kept = of_part(job, case, outcome);
+    let of_part = kept.len();
     let (lives, edges) = of_edges(job, case, outcome);
-    let worst = |name: &'static str, among: &[Kept]| {
-        let of_name = among.iter().filter(|kept| kept.name == name);
+    kept.extend(lives.into_iter().chain(edges));
+    let joint = joint(job, &case.open, &mut kept, of_part)?;
+    let worst = |name: &'static str| {
+        let of_name = kept.iter().filter(|kept| kept.name == name);
         of_name.max_by(|a, b| a.passed.total_cmp(&b.passed)).map(|kept| ScheduledLimitKept {
             limit: name.to_owned(),
             zone: kept.zone.clone(),
             probability: bounded(1.0 - kept.passed),
         })
     };
-    let mut limits: Vec<ScheduledLimitKept> =
-        OUTPUT_LIMITS.iter().filter_map(|limit| worst(limit.name, &part)).collect();
-    limits.extend(worst("tool_life_min", &lives));
-    limits.extend(worst("edge", &edges));
+    let names = OUTPUT_LIMITS.iter().map(|limit| limit.name).chain(["tool_life_min", "edge"]);
+    let mut limits: Vec<ScheduledLimitKept> = names.filter_map(worst).collect();
     if limits.is_empty() {
         return Ok(None);
     }
     limits.sort_by(|a, b| a.probability.total_cmp(&b.probability));
-    let joint = joint(job, &case.open, &part)?;
     Ok(Some(ScheduleConformance {
         limits,
-        joint_probability: (!part.is_empty()).then(|| bounded(joint)),
+        joint_probability: (of_part > 0).then(|| bounded(joint)),
         gain_percent_per_percent_of_risk: None,
         risk_percent: None,
     }))
 }
 
-/// The probability that all limits of a part are kept. Results scatter independently about their models; coefficients that are
-/// uncertain, and what is not known of effects, are common to all zones and integrated over.
-fn joint(job: &Job, open: &OpenModels, part: &[Kept]) -> Result<f64, Failure> {
+/// The probability that all limits of a part are kept, the first of these. Results scatter independently about their models; coefficients
+/// that are uncertain, and what is not known of effects, are common to all zones and integrated over. Where effects bend the results, each
+/// limit is told with what that makes of it over the same points, beside what it is to first order.
+fn joint(job: &Job, open: &OpenModels, kept: &mut [Kept], of_part: usize) -> Result<f64, Failure> {
     let lower = |output: Output| {
         let covariance = job.models.get(output)?.coefficient_covariance.as_ref()?;
         // A covariance of lower rank gets what round-off leaves of it.
@@ -359,40 +362,50 @@ fn joint(job: &Job, open: &OpenModels, part: &[Kept]) -> Result<f64, Failure> {
     };
     let lowers = Output::ALL.map(lower);
     if lowers.iter().all(Option::is_none) && open.count() == 0 {
-        return Ok(part.iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp());
+        return Ok(kept[..of_part].iter().map(|kept| (-kept.passed).ln_1p()).sum::<f64>().exp());
     }
     let sizes = lowers.each_ref().map(|lower| lower.as_ref().map_or(0, DMatrix::nrows));
-    let moved = |kept: &Kept, scores: &[f64]| -> f64 {
+    let factors: Vec<_> =
+        kept.iter().map(|kept| of_fit::factors(job, kept.output, kept.depth_mm).unwrap_or_default()).collect();
+    let moved = |kept: &Kept, factors: &[[f64; 3]], scores: &[f64]| -> f64 {
         let output = kept.output as usize;
         let Some(lower) = &lowers[output] else { return 0.0 };
         let from: usize = sizes[..output].iter().sum();
-        let Some(covariance) = job.models.get(kept.output).and_then(|model| model.coefficient_covariance.as_ref())
-        else {
-            return 0.0;
-        };
         let off = lower * DVector::from_column_slice(&scores[from..from + sizes[output]]);
         let (u, x) = kept.at;
-        let factors = covariance.factors(kept.depth_mm, job.cutting_edge_angle_deg);
         factors.iter().zip(off.iter()).map(|(by, off)| (by[0] + by[1] * u + by[2] * x) * off).sum()
     };
-    let given = part.iter().map(|kept| Given { output: kept.output, at: kept.at, depth_mm: kept.depth_mm }).collect();
+    let is_kept = |of: &Kept, left: f64| {
+        let residual = job.models.get(of.output).and_then(|model| model.residual_scatter).unwrap_or(0.0);
+        if residual > 0.0 { 1.0 - normal_tail(left / residual) } else { f64::from(u8::from(left >= 0.0)) }
+    };
+    let given = kept.iter().map(|kept| Given { output: kept.output, at: kept.at, depth_mm: kept.depth_mm }).collect();
     let by_effects = MovedResults::of(open, job, given)?;
-    let count = if by_effects.are_straight() { POINTS } else { POINTS_BENT };
+    let is_bent = !by_effects.are_straight();
+    let count = if is_bent { POINTS_BENT } else { POINTS };
     let of_coefficients: usize = sizes.iter().sum();
-    let mut sum = 0.0;
+    let (mut all, mut bent) = (0.0, vec![0.0; kept.len()]);
     for scores in points(count, of_coefficients + open.count(), SEED) {
-        let by_effects = by_effects.at(&scores[of_coefficients..])?;
-        sum += part
-            .iter()
-            .zip(by_effects)
-            .map(|(kept, by_effects)| {
-                let residual = job.models.get(kept.output).and_then(|model| model.residual_scatter).unwrap_or(0.0);
-                let left = kept.beyond - moved(kept, &scores) - by_effects;
-                if residual > 0.0 { 1.0 - normal_tail(left / residual) } else { f64::from(u8::from(left >= 0.0)) }
-            })
-            .product::<f64>();
+        let own = &scores[of_coefficients..];
+        let (really, nearly) = (by_effects.at(own)?, by_effects.nearly(own));
+        let mut together = 1.0;
+        for (i, kept) in kept.iter().enumerate() {
+            let by_fit = moved(kept, &factors[i], &scores);
+            let at = |by_effects: f64| is_kept(kept, kept.beyond - kept.side * (by_fit + by_effects));
+            let here = at(really[i]);
+            if i < of_part {
+                together *= here;
+            }
+            if is_bent {
+                bent[i] += here - at(nearly[i]);
+            }
+        }
+        all += together;
     }
-    Ok(sum / count as f64)
+    for (kept, bent) in kept.iter_mut().zip(bent) {
+        kept.passed = (kept.passed - bent / count as f64).clamp(0.0, 1.0);
+    }
+    Ok(all / count as f64)
 }
 
 /// How many standard deviations lie between what is expected and a limit that is passed with this probability.

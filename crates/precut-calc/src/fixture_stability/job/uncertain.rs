@@ -121,6 +121,7 @@ pub(in crate::fixture_stability) struct Drawn {
 uncertainty_block! {
     /// What is uncertain, and which probability is wanted.
     FixtureUncertainty {
+        force_percent: Option<f64>, of CuttingForce;
         quantities: FixtureUncertainQuantity of FixtureQuantity (max_items = 8, extensions(("x-advanced" = json!(true)))), such as "damping";
         correlations: FixtureCorrelation (28), such as ["joint_stiffness", "damping"];
         effects: Vec<JointUncertainty>;

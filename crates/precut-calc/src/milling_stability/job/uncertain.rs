@@ -170,6 +170,7 @@ impl Quantity for MillingQuantity {
 uncertainty_block! {
     /// What is uncertain, and which probability is wanted; acts with the analysis `certainty`.
     MillingUncertainty {
+        force_percent: Option<f64>, of CuttingForce;
         quantities: MillingUncertainQuantity of MillingQuantity (max_items = 13), such as "mode_damping";
         correlations: MillingCorrelation (78), such as ["mode_stiffness", "mode_damping"];
         effects: Vec<JointUncertainty>;
