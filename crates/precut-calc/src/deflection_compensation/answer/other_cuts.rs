@@ -85,10 +85,16 @@ fn slower(job: &Job) -> Option<OtherCut> {
         Some(pass) => pass.feed_mm_per_rev.get_or_insert(job.cut.feed_mm_per_rev),
         None => &mut slower.cut.feed_mm_per_rev,
     };
-    *feed *= SLOWER;
+    *feed = in_three_digits(SLOWER * *feed);
     let feed_mm_per_rev = *feed;
     (feed_mm_per_rev >= *LEAST_FEED_MM_PER_REV)
         .then(|| OtherCut { job: slower, action: ImprovingAction::LowerFeed { feed_mm_per_rev } })
+}
+
+/// As it is told and typed in.
+fn in_three_digits(value: f64) -> f64 {
+    let steps = 10_f64.powf(2.0 - value.log10().floor());
+    (value * steps).round() / steps
 }
 
 /// A compensated pass before the last one that leaves half of its depth. Of a shaft that is turned to several diameters in one pass no one
