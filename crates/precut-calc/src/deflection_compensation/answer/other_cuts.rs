@@ -2,9 +2,9 @@
 
 use std::sync::LazyLock;
 
-use serde_json::Value;
-use utoipa::PartialSchema;
+use utoipa::openapi::schema::{Array, Object};
 use utoipa::openapi::{RefOr, Schema};
+use utoipa::{Number, PartialSchema};
 
 use crate::calculator::{Failure, Monitor};
 use crate::certainty::lines::Estimate;
@@ -24,15 +24,23 @@ use crate::deflection_compensation::job::input::{Job, Pass};
 const SLOWER: f64 = 0.7;
 /// Share of its depth that a shallower last pass keeps.
 const SHALLOWER: f64 = 0.5;
-/// Least feed and most passes of a job: they stand in its schema.
-static LEAST_FEED_MM_PER_REV: LazyLock<f64> =
-    LazyLock::new(|| bound(Pass::schema(), "/properties/feed_mm_per_rev/minimum"));
-static MOST_PASSES: LazyLock<f64> = LazyLock::new(|| bound(Job::schema(), "/properties/passes/maxItems"));
+/// Least feed and most passes of a job: they stand in its schema. Nothing keeps what would have no bound there.
+static LEAST_FEED_MM_PER_REV: LazyLock<f64> = LazyLock::new(|| match field(Pass::schema(), "feed_mm_per_rev") {
+    Some(Schema::Object(Object { minimum: Some(Number::Float(least)), .. })) => least,
+    _ => f64::INFINITY,
+});
+static MOST_PASSES: LazyLock<usize> = LazyLock::new(|| match field(Job::schema(), "passes") {
+    Some(Schema::Array(Array { max_items, .. })) => max_items.unwrap_or(0),
+    _ => 0,
+});
 
-/// A bound of a schema; not a number where there is none, which nothing keeps.
-fn bound(schema: RefOr<Schema>, at: &str) -> f64 {
-    let schema = serde_json::to_value(schema).unwrap_or_default();
-    schema.pointer(at).and_then(Value::as_f64).unwrap_or(f64::NAN)
+/// The schema of a field.
+fn field(schema: RefOr<Schema>, name: &str) -> Option<Schema> {
+    let RefOr::T(Schema::Object(object)) = schema else { return None };
+    match object.properties.get(name)?.clone() {
+        RefOr::T(schema) => Some(schema),
+        RefOr::Ref(_) => None,
+    }
 }
 
 /// Another cut, and what is done for it.
@@ -119,7 +127,7 @@ fn shallower(job: &Job) -> Option<OtherCut> {
         }
         [_] => return None,
     };
-    (shallower.passes.len() as f64 <= *MOST_PASSES)
+    (shallower.passes.len() <= *MOST_PASSES)
         .then(|| OtherCut { job: shallower, action: ImprovingAction::ShallowerLastPass { diameter_mm } })
 }
 
