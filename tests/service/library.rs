@@ -484,6 +484,25 @@ async fn a_study_varies_names_and_a_diagnosis_takes_them() {
         "{study:#}"
     );
 
+    let mode =
+        json!({ "frequency_hz": 900, "damping_ratio": 0.03, "stiffness_n_per_mm": 18_000, "direction": [1, 0, 0] });
+    let milling = json!({
+        "machine": "vmc_bt40", "material": "AlMgSi1", "cutter": { "name": "endmill_12_z4_r1" },
+        "tool": { "kind": "modes", "modes": [mode] }, "work": { "kind": "rigid" },
+        "cut": { "depth_mm": 1, "width_mm": 4, "milling": "down", "spindle_speed_rpm": 8000, "feed_mm_per_tooth": 0.06 },
+    });
+    let study = json!({
+        "calculator": "milling-stability", "job": milling,
+        "vary": [{ "pointer": "/cutter/name", "values": ["endmill_12_z4_r1", "endmill_16_z4"] }],
+    });
+    let response = server.post_to("/v1/studies", study.to_string()).header("prefer", "wait=60").send().await.unwrap();
+    let (status, text) = (response.status().as_u16(), response.text().await.unwrap());
+    assert_eq!(status, 200, "{text}");
+    let study: Value = serde_json::from_str(&text).unwrap();
+    let rows = study["result"]["rows"].as_array().unwrap();
+    assert_eq!(study["result"]["succeeded"], 2, "{study:#}");
+    assert_ne!(rows[0], rows[1], "another cutter has another limit");
+
     let mut base = shaft_by_names();
     base["tool"] = json!("dnmg150608_pdjnr2525m15");
     let rows: Vec<Value> =

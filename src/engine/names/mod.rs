@@ -330,8 +330,11 @@ pub(crate) fn enclosed(records: Option<&Value>) -> Found {
 pub(crate) fn is_a_name(entry: &Entry, job: &Value, tokens: &[String]) -> bool {
     let Some((path, calculator)) = place(entry, job) else { return false };
     let rest = if path.is_empty() { Some(tokens) } else { tokens.strip_prefix(&[JOB.to_owned()]) };
-    let first = rest.and_then(<[String]>::first);
-    Kind::NAMED.into_iter().any(|kind| first.is_some_and(|first| first == kind.name()) && takes(&calculator, kind))
+    let Some([first, ..]) = rest else { return false };
+    let pointer = format!("/{}", rest.unwrap_or_default().join("/"));
+    let of_kind = || Kind::NAMED.into_iter().any(|kind| first == kind.name() && takes(&calculator, kind));
+    let described = || precut_library::asked(&calculator, &with(within(job, &path), &pointer, &Value::from("x")));
+    of_kind() || described().iter().any(|asked| asked.pointer == pointer)
 }
 
 /// What may be asked about names while a job is read.
